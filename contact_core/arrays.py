@@ -1,0 +1,74 @@
+"""Checked, read-only arrays: the only kind that the core's values hold."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from contact_core.errors import InvalidInput
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+ComplexArray = npt.NDArray[np.complex128]
+
+
+def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name: str) -> npt.NDArray[Any]:
+    """A contiguous read-only array of `dtype` and `shape` (None: any extent); a copy unless already frozen.
+
+    Raises InvalidInput naming the array when the shape does not fit or a value is NaN or infinite.
+    """
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"{name} must be an array of numbers of shape {_spell(shape)}; got {error}.") from error
+    if array.size == 0 and array.ndim != len(shape):  # an empty list has no shape of its own
+        array = np.zeros(tuple(extent or 0 for extent in shape))
+    if array.dtype.kind not in "biufc":
+        raise InvalidInput(f"{name} must be an array of numbers of shape {_spell(shape)}; got {array.dtype}.")
+    wants_whole = np.issubdtype(np.dtype(dtype), np.integer) and array.dtype.kind in "fc"
+    if wants_whole and not (np.isfinite(array).all() and np.array_equal(array, np.trunc(array.real))):
+        raise InvalidInput(f"{name} must hold whole numbers, but holds fractions or NaN ({array.dtype}).")
+    fits = array.ndim == len(shape) and all(
+        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise InvalidInput(f"{name} must have shape {_spell(shape)}, but has {array.shape}.")
+    if not (array.dtype == np.dtype(dtype) and array.flags.c_contiguous and _is_immutable(array)):
+        array = np.array(array, dtype=dtype, order="C", copy=True)
+        array.setflags(write=False)
+    if np.issubdtype(array.dtype, np.inexact) and not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0].tolist()
+        raise InvalidInput(f"{name} must be finite, but entry {where} is {array[tuple(where)]}.")
+    return array
+
+
+def digest(*arrays: npt.NDArray[Any]) -> str:
+    """A short content digest (32 hex digits) of the bytes and shapes of arrays, in order."""
+    state = hashlib.sha256()
+    for array in arrays:
+        state.update(repr((array.dtype.str, array.shape)).encode())
+        state.update(np.ascontiguousarray(array).data)
+    return state.hexdigest()[:32]
+
+
+def _is_immutable(array: npt.NDArray[Any]) -> bool:
+    """Whether nobody can write to the memory: the array and every array that it views are read-only."""
+    holder: Any = array
+    while isinstance(holder, np.ndarray):
+        if holder.flags.writeable:
+            return False
+        holder = holder.base
+    return holder is None  # anything else is memory that another library owns
+
+
+def _spell(shape: tuple[int | None, ...]) -> str:
+    return (
+        "("
+        + ", ".join("any" if extent is None else str(extent) for extent in shape)
+        + ("," if len(shape) == 1 else "")
+        + ")"
+    )

@@ -1,0 +1,37 @@
+"""Errors that are sentences: what was wanted, what came, what to do.
+
+One small family. Code that talks to people (the command line, an adapter's panel) catches
+`ContactError` and shows its text; everything else is a bug and keeps its traceback.
+"""
+
+
+class ContactError(Exception):
+    """Base of every error that this project raises on purpose. Its text is meant for people."""
+
+
+class InvalidInput(ContactError, ValueError):
+    """A value that cannot be used: wrong shape, out of range, not finite, unknown name."""
+
+
+class NotManifold(InvalidInput):
+    """The surface is not manifold where an operation needs it; names the face or vertex."""
+
+
+class FileRefused(ContactError):
+    """A file that cannot be read or written: unknown format, damage, a newer schema, no room."""
+
+
+class CommandRejected(ContactError):
+    """An edit that does not apply to this document; the document is unchanged."""
+
+
+class MissingExtra(ContactError, ImportError):
+    """An optional library is absent; the text holds the pip line that brings it."""
+
+    def __init__(self, what: str, extra: str) -> None:
+        super().__init__(f'{what} needs an optional library. Install it with: pip install "contact-core[{extra}]"')
+        self.extra = extra
+
+
+class Cancelled(ContactError):
+    """The user cancelled; nothing was changed."""

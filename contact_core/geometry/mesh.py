@@ -1,0 +1,85 @@
+"""The triangle mesh: two immutable arrays, and what follows from them, computed when asked for."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray, digest, frozen
+from contact_core.errors import InvalidInput
+
+
+class TriangleMesh:
+    """An immutable triangle mesh.
+
+    points: (n, 3) float64, surface units.  faces: (m, 3) int64, indices into points, counter-clockwise
+    seen from outside. Construction checks shapes, finiteness and index ranges, and nothing more:
+    manifoldness is asked for only where an operation needs it (see `contact_core.geometry.topology`).
+    Raises InvalidInput.
+    """
+
+    def __init__(self, points: Any, faces: Any) -> None:
+        self.points: FloatArray = frozen(points, np.float64, (None, 3), "points")
+        self.faces: IntArray = frozen(faces, np.int64, (None, 3), "faces")
+        if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= len(self.points)):
+            bad = int(np.argmax(((self.faces < 0) | (self.faces >= len(self.points))).any(axis=1)))
+            raise InvalidInput(
+                f"faces must index the {len(self.points)} points, but face {bad} is {self.faces[bad].tolist()}."
+            )
+
+    def __repr__(self) -> str:
+        return f"TriangleMesh({len(self.points)} points, {len(self.faces)} faces)"
+
+    @cached_property
+    def digest(self) -> str:
+        """Content digest of topology and positions; positions as float32, so hosts that store float32 agree."""
+        return digest(self.points.astype(np.float32), self.faces)
+
+    @cached_property
+    def topology_digest(self) -> str:
+        """Content digest of the faces alone: equal for the same asset in another shape."""
+        return digest(np.array([len(self.points)]), self.faces)
+
+    @cached_property
+    def bounding_box_diagonal(self) -> float:
+        """Length of the diagonal of the box round the points that faces use (surface units)."""
+        used = self.points[np.unique(self.faces)] if len(self.faces) else self.points
+        return float(np.linalg.norm(np.ptp(used, axis=0))) if len(used) else 0.0
+
+    @cached_property
+    def face_normals(self) -> FloatArray:
+        """(m, 3) unit normals; zero for degenerate faces."""
+        a, b, c = (self.points[self.faces[:, k]] for k in range(3))
+        cross = np.cross(b - a, c - a)  # (m, 3), length = twice the area
+        length = np.linalg.norm(cross, axis=1, keepdims=True)
+        return np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(m,) areas, square surface units."""
+        a, b, c = (self.points[self.faces[:, k]] for k in range(3))
+        return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+
+    @cached_property
+    def vertex_normals(self) -> FloatArray:
+        """(n, 3) unit normals, the faces' normals weighted by their angle at the vertex; zero where unused."""
+        normals = np.zeros_like(self.points)
+        corners = self.points[self.faces]  # (m, 3, 3)
+        for k in range(3):
+            u = corners[:, (k + 1) % 3] - corners[:, k]
+            v = corners[:, (k + 2) % 3] - corners[:, k]
+            angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("mi,mi->m", u, v))  # (m,)
+            for axis in range(3):
+                normals[:, axis] += np.bincount(
+                    self.faces[:, k], weights=angle * self.face_normals[:, axis], minlength=len(self.points)
+                )
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+
+    def with_points(self, points: Any) -> TriangleMesh:
+        """The same faces with new points (n, 3)."""
+        if np.shape(points) != self.points.shape:
+            raise InvalidInput(f"points must have shape {self.points.shape}, but have {np.shape(points)}.")
+        return TriangleMesh(points, self.faces)

@@ -1,0 +1,144 @@
+"""The plugin slots that belong to no lower floor: formats, samples, renderers, placers, sub-commands.
+
+The protocols of the other slots live with what they serve: `contact.brush.Brush`,
+`contact.axis_generator.AxisGenerator`, `pose.terms.PoseTerm`, `pose.solver.PoseSolver`,
+`geometry.engine.GeodesicEngine`, `host.HostAdapter`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
+
+from contact_core.arrays import FloatArray
+from contact_core.document.asset import Asset
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.rig import Pose, Rig
+
+
+@runtime_checkable
+class Format(Protocol):
+    """A file format (hook `contact_formats`)."""
+
+    name: str  # "gltf"
+    suffixes: tuple[str, ...]  # (".glb", ".gltf"), lower case
+    can_read: bool
+    can_write: bool
+
+    def read(self, path: Path, *, sidecar: Path | None = None) -> Asset:
+        """The asset in a file. Raises FileRefused with a sentence; never anything else for bad input."""
+        ...
+
+    def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
+        """Write assets, rigs posed by name where given; whole or not at all. Raises FileRefused."""
+        ...
+
+
+@runtime_checkable
+class Sample(Protocol):
+    """A built-in or third-party sample asset (hook `contact_samples`)."""
+
+    name: str
+    kind: Literal["manipulator", "object"]
+    summary: str
+
+    def build(self) -> Asset:
+        """Deterministic; in seconds."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class PictureMesh:
+    """One mesh of a picture. color: RGB 0..1; opacity 0..1; vertex_colors (n, 3) override color."""
+
+    mesh: TriangleMesh
+    color: tuple[float, float, float]
+    opacity: float = 1.0
+    vertex_colors: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """All that a renderer needs, in world space: meshes, coloured points, line segments, camera, caption."""
+
+    meshes: tuple[PictureMesh, ...]
+    points: tuple[tuple[FloatArray, tuple[float, float, float]], ...] = ()  # (k, 3) positions, colour
+    lines: tuple[tuple[FloatArray, tuple[float, float, float]], ...] = ()  # (k, 2, 3) segments, colour
+    camera_from: tuple[float, float, float] | None = None  # direction from the centre to the eye
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    caption: str = ""
+    table: tuple[tuple[str, str, bool], ...] = ()  # name, value, failed
+
+
+@runtime_checkable
+class Renderer(Protocol):
+    """Draws a picture off-screen (hook `contact_renderers`)."""
+
+    name: str
+    priority: int  # the highest that is available is taken
+
+    def unavailable(self) -> str | None:
+        """None when it can draw here, else a sentence with the reason and the cure."""
+        ...
+
+    def render(self, pictures: Sequence[Picture], path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
+        """Draw pictures side by side into one PNG; whole or not at all."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class PlacementRequest:
+    """What a placer gets: a posed manipulator, an object, and the patches to place.
+
+    object_from_rig: (4, 4) takes rig space to object surface space. patch_points, patch_axes: per patch name,
+    on the manipulator's surface. options: the recipe's own settings for this placer.
+    """
+
+    rig: Rig
+    pose: Pose
+    object_mesh: TriangleMesh
+    object_from_rig: FloatArray
+    patch_points: Mapping[str, SurfacePoints]
+    patch_axes: Mapping[str, SurfacePoints]
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class PatchPlacement:
+    """Where one patch goes: root on the object and the world direction of its axis there (projected)."""
+
+    root: SurfacePoints  # one point
+    direction: FloatArray  # (3,) object surface space
+
+
+@dataclass(frozen=True, eq=False)
+class PlacementResult:
+    """Placements by patch name, and the patches left out with the reason."""
+
+    placed: Mapping[str, PatchPlacement]
+    left_out: Mapping[str, str]
+
+
+@runtime_checkable
+class Placer(Protocol):
+    """Chooses roots and headings on the object from a coarse pose (hook `contact_placers`)."""
+
+    name: str
+
+    def place(self, request: PlacementRequest) -> PlacementResult: ...
+
+
+@runtime_checkable
+class CliCommand(Protocol):
+    """A sub-command of `contact` (hook `contact_cli`); declared so that --help imports nothing heavy."""
+
+    name: str
+    summary: str
+
+    def configure(self, parser: argparse.ArgumentParser) -> None: ...
+
+    def run(self, arguments: argparse.Namespace) -> int: ...
