@@ -17,7 +17,7 @@ from contact_core.geometry.mesh import TriangleMesh
 
 
 def grid_faces(rows: int, columns: int, *, wrap_rows: bool = False, wrap_columns: bool = False) -> IntArray:
-    """(m, 3) faces over a rows x columns lattice of vertices, alternating diagonals."""
+    """(m, 3) faces over a rows x columns lattice of vertices, alternating diagonals; normal = column x row axis."""
     r = np.arange(rows if wrap_rows else rows - 1)[:, None]
     c = np.arange(columns if wrap_columns else columns - 1)[None, :]
     a = r * columns + c
@@ -32,14 +32,14 @@ def grid_faces(rows: int, columns: int, *, wrap_rows: bool = False, wrap_columns
 
 def plane(resolution: int = 12, size: float = 1.0) -> TriangleMesh:
     """A flat square of `resolution`^2 cells in z = 0, normals +z."""
-    x, y = np.meshgrid(*2 * [np.linspace(0.0, size, resolution + 1)], indexing="ij")
+    x, y = np.meshgrid(*2 * [np.linspace(0.0, size, resolution + 1)])
     points = np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3)
     return TriangleMesh(points, grid_faces(resolution + 1, resolution + 1))
 
 
 def height_field(height: Callable[[FloatArray, FloatArray], FloatArray], resolution: int = 14) -> TriangleMesh:
     """The graph z = height(x, y) over [-1, 1]^2, normals +z."""
-    x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, resolution + 1)], indexing="ij")
+    x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, resolution + 1)])
     points = np.stack([x, y, height(x, y)], -1).reshape(-1, 3)
     return TriangleMesh(points, grid_faces(resolution + 1, resolution + 1))
 
@@ -86,10 +86,10 @@ def torus(around: int = 28, section: int = 16, major: float = 1.0, minor: float 
     """A closed torus about z: genus 1, both signs of curvature."""
     u = 2.0 * np.pi * np.arange(around) / around
     v = 2.0 * np.pi * np.arange(section) / section
-    uu, vv = np.meshgrid(u, v, indexing="ij")
+    uu, vv = np.meshgrid(u, v)
     ring = major + minor * np.cos(vv)
     points = np.stack([ring * np.cos(uu), ring * np.sin(uu), minor * np.sin(vv)], -1).reshape(-1, 3)
-    return TriangleMesh(points, grid_faces(around, section, wrap_rows=True, wrap_columns=True))
+    return TriangleMesh(points, grid_faces(section, around, wrap_rows=True, wrap_columns=True))
 
 
 def noisy(subdivisions: int = 2, amplitude: float = 0.06, seed: int = 7) -> TriangleMesh:
@@ -103,9 +103,8 @@ def with_holes(resolution: int = 16) -> TriangleMesh:
     """A wavy sheet with two holes: shortest paths bend round the rims."""
     mesh = height_field(lambda x, y: 0.2 * np.sin(3.0 * x) * np.cos(2.0 * y), resolution)
     centres = mesh.points[mesh.faces].mean(axis=1)[:, :2]  # (m, 2)
-    inside = (np.linalg.norm(centres - [0.35, 0.3], axis=1) < 0.28) | (
-        np.linalg.norm(centres + [0.4, 0.35], axis=1) < 0.22
-    )
+    first, second = np.array([0.35, 0.3]), np.array([-0.4, -0.35])
+    inside = (np.linalg.norm(centres - first, axis=1) < 0.28) | (np.linalg.norm(centres - second, axis=1) < 0.22)
     return without_unused(mesh.points, mesh.faces[~inside])
 
 
@@ -114,9 +113,9 @@ def sliver(ratio: float = 1000.0, resolution: int = 10) -> TriangleMesh:
     steps = np.where(np.arange(resolution) % 2 == 0, 1.0, 1.0 / ratio)
     y = np.concatenate([[0.0], np.cumsum(steps)])
     x = np.linspace(0.0, 5.0, 6)
-    xx, yy = np.meshgrid(x, y, indexing="ij")
+    xx, yy = np.meshgrid(x, y)
     points = np.stack([xx, yy, 0.1 * xx * xx / 5.0], -1).reshape(-1, 3)
-    return TriangleMesh(points, grid_faces(len(x), len(y)))
+    return TriangleMesh(points, grid_faces(len(y), len(x)))
 
 
 def subdivided(mesh: TriangleMesh) -> TriangleMesh:
