@@ -1,0 +1,70 @@
+"""Welding: points at one position become one point, with the map from the old points to the new.
+
+Files split vertices along texture and normal seams; geodesics need the surface that the eye sees.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray, frozen
+from contact_core.errors import InvalidInput
+
+RELATIVE_TOLERANCE = 1e-6  # of the bounding box diagonal: above float32 rounding, far below any real edge
+
+
+def weld(points: Any, tolerance: float | None = None) -> tuple[FloatArray, IntArray]:
+    """Merge points closer than `tolerance` (surface units; None: 1e-6 of the bounding box diagonal).
+
+    points: (n, 3). Returns the kept points (k, 3), bit-equal to the first of each group and in the order of
+    first appearance, and map (n,) with `kept[map[i]]` the point that i became. Closeness chains: a row of points,
+    each within tolerance of the next, becomes one. Tolerance 0 merges equal positions only. Raises InvalidInput.
+    """
+    positions = frozen(points, np.float64, (None, 3), "points")
+    if tolerance is None:
+        tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(positions, axis=0))) if len(positions) else 0.0
+    if not tolerance >= 0.0:
+        raise InvalidInput(f"the weld tolerance must be zero or positive, but {tolerance} came.")
+    first, group = _equal_rows(positions)
+    if tolerance > 0.0 and len(first) > 1:
+        first, group = _join_close(positions, first, group, tolerance)
+    return positions[first], group
+
+
+def _equal_rows(positions: FloatArray) -> tuple[IntArray, IntArray]:
+    """Row of the first of each group of equal positions, ascending, and the group of each row."""
+    exact = positions + 0.0  # -0.0 and 0.0 are one position
+    order = np.lexsort(exact.T)  # stable: equal rows keep their order
+    fresh = np.ones(len(exact), bool)
+    fresh[1:] = (exact[order[1:]] != exact[order[:-1]]).any(axis=1)
+    group = np.empty(len(exact), np.int64)
+    group[order] = np.cumsum(fresh) - 1
+    return _by_first_appearance(order[fresh], group)
+
+
+def _join_close(
+    positions: FloatArray, first: IntArray, group: IntArray, tolerance: float
+) -> tuple[IntArray, IntArray]:
+    """The same, after joining groups whose positions are within tolerance of one another."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(positions[first]).query_pairs(tolerance, output_type="ndarray")  # (p, 2)
+    if not len(pairs):
+        return first, group
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
+    count, label = connected_components(graph, directed=False)
+    earliest = np.full(count, len(positions), np.int64)
+    np.minimum.at(earliest, label, first)
+    return _by_first_appearance(earliest, label[group].astype(np.int64))
+
+
+def _by_first_appearance(first: IntArray, group: IntArray) -> tuple[IntArray, IntArray]:
+    """Renumber groups so that their first rows ascend."""
+    order = np.argsort(first)
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[group]
