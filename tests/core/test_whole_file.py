@@ -1,0 +1,46 @@
+"""Files are written whole or not at all."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+import pytest
+
+from contact_core.errors import FileRefused
+from contact_core.whole_file import replacing, write_whole
+
+
+def test_a_file_is_written_and_replaced_and_nothing_else_remains(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "report.json"
+    write_whole(target, "first")
+    write_whole(target, b"second")
+    assert target.read_bytes() == b"second"
+    assert list(target.parent.iterdir()) == [target]
+    plain = tmp_path / "plain"
+    plain.write_text("")
+    assert stat.S_IMODE(target.stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
+
+
+def test_an_error_while_writing_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
+    target = tmp_path / "picture.png"
+    write_whole(target, b"old")
+    with pytest.raises(ZeroDivisionError), replacing(target) as temporary:
+        assert temporary.suffix == ".png"
+        temporary.write_bytes(b"half")
+        raise ZeroDivisionError
+    assert target.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_that_is_a_file_is_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "folder").write_text("")
+    with pytest.raises(FileRefused, match="cannot write into"):
+        write_whole(tmp_path / "folder" / "report.json", b"")
+
+
+def test_a_target_that_is_a_folder_is_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(FileRefused, match=r"cannot write .*taken"):
+        write_whole(tmp_path / "taken", b"")
+    assert list(tmp_path.iterdir()) == [tmp_path / "taken"]
