@@ -1,0 +1,71 @@
+"""Where this machine keeps what can be made again: distance fields, generated samples, compiled kernels.
+
+`CONTACT_CACHE` names the directory; else the platform's own cache directory is used. Everything in it may be
+deleted at any time. Files are numpy archives (never pickles) under a content key, written whole or not at all.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+
+def cache_directory() -> Path | None:
+    """The cache directory, made if absent; None where none can be written."""
+    for candidate in _candidates():
+        try:
+            candidate.mkdir(parents=True, exist_ok=True)
+            if os.access(candidate, os.W_OK):
+                return candidate
+        except OSError:
+            continue
+    return None
+
+
+def cached_arrays(
+    kind: str, key: str, make: Callable[[], dict[str, npt.NDArray[Any]]]
+) -> dict[str, npt.NDArray[Any]]:
+    """The arrays kept under `kind`/`key`, or made now and kept for the next time.
+
+    An unreadable or unwritable cache is no error: the arrays are simply made.
+    """
+    directory = cache_directory()
+    path = None if directory is None else directory / kind / f"{key}.npz"
+    if path is not None and path.is_file():
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                return {name: archive[name] for name in archive.files}
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            pass  # a damaged file is made again
+    arrays = make()
+    if path is not None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
+                np.savez_compressed(part, allow_pickle=False, **arrays)
+            Path(part.name).replace(path)
+        except OSError:
+            pass
+    return arrays
+
+
+def _candidates() -> list[Path]:
+    named = os.environ.get("CONTACT_CACHE")
+    if named:
+        return [Path(named)]
+    if sys.platform == "win32":
+        system = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        system = Path.home() / "Library" / "Caches"
+    else:
+        system = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    return [system / "contact-core", Path(tempfile.gettempdir()) / f"contact-core-{user}"]

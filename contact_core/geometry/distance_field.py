@@ -1,0 +1,113 @@
+"""A signed distance field on a grid: how deep a point is inside an object, and which way leads out.
+
+Negative inside. In a band of two cells round the surface a node's distance is exact (closest point on the
+triangles) and its sign is the generalised winding number's (> 0.5 is inside), so small holes and self-overlaps
+of scans do no harm; every other node takes the closest point and the sign of its nearest node in the band
+(a feature transform: an upper bound of the distance, off by less than a cell). Between nodes values are
+trilinear and the gradient is that of the trilinear interpolant, so that a solver sees a function and its
+true derivative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from contact_core.arrays import FloatArray, frozen
+from contact_core.cache import cached_arrays
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
+
+BAND = 2.0  # cells
+VERSION = 1  # of the cached fields: raise it when the values change
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceField:
+    """origin: (3,) position of node (0, 0, 0). spacing: cell size. values: (x, y, z) signed distances at nodes."""
+
+    origin: FloatArray
+    spacing: float
+    values: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "origin", frozen(self.origin, np.float64, (3,), "origin"))
+        object.__setattr__(self, "values", frozen(self.values, np.float64, (None, None, None), "values"))
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh, *, resolution: int = 64, margin: float = 0.15) -> DistanceField:
+        """The field of a mesh: `resolution` nodes along the longest side of its box widened by `margin` of its
+        diagonal. Kept on disk by content; raises InvalidInput for a mesh without faces or a bad resolution."""
+        if not 4 <= resolution <= 256:
+            raise InvalidInput(f"a distance field needs 4 to 256 nodes a side, but {resolution} were asked for.")
+        used = mesh.points[np.unique(mesh.faces)]
+        if not len(used):
+            raise InvalidInput("a distance field needs a mesh with faces, but it has none.")
+        pad = margin * mesh.bounding_box_diagonal
+        low, high = used.min(axis=0) - pad, used.max(axis=0) + pad
+        spacing = float((high - low).max() / (resolution - 1))
+        shape = tuple(int(n) for n in np.ceil((high - low) / spacing).astype(int) + 1)
+
+        def make() -> dict[str, FloatArray]:
+            values = _signed_distances(mesh, low, spacing, shape)
+            return {"values": values.astype(np.float32)}
+
+        key = f"{mesh.digest}-{resolution}-{margin:g}-v{VERSION}"
+        values = cached_arrays("distance-fields", key, make)["values"]
+        return cls(low, spacing, values)
+
+    def sample(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed distance (k,) and gradient (k, 3) at points (k, 3).
+
+        Outside the grid: the value at the nearest point of the grid's box plus the distance to it.
+        """
+        limit = np.array(self.values.shape) - 1  # (3,) cells
+        grid = (np.asarray(points, dtype=np.float64) - self.origin) / self.spacing  # (k, 3) in cells
+        clamped = np.clip(grid, 0.0, limit)
+        cell = np.minimum(clamped.astype(np.int64), limit - 1)  # (k, 3)
+        f = clamped - cell  # (k, 3) in 0..1
+        i, j, k = cell.T
+        v = self.values
+        c00, c10 = _mix(v[i, j, k], v[i + 1, j, k], f[:, 0]), _mix(v[i, j + 1, k], v[i + 1, j + 1, k], f[:, 0])
+        c01 = _mix(v[i, j, k + 1], v[i + 1, j, k + 1], f[:, 0])
+        c11 = _mix(v[i, j + 1, k + 1], v[i + 1, j + 1, k + 1], f[:, 0])
+        near, far = _mix(c00, c10, f[:, 1]), _mix(c01, c11, f[:, 1])
+        value = _mix(near, far, f[:, 2])
+        dx = _mix(
+            _mix(v[i + 1, j, k] - v[i, j, k], v[i + 1, j + 1, k] - v[i, j + 1, k], f[:, 1]),
+            _mix(v[i + 1, j, k + 1] - v[i, j, k + 1], v[i + 1, j + 1, k + 1] - v[i, j + 1, k + 1], f[:, 1]),
+            f[:, 2],
+        )
+        gradient = np.stack([dx, _mix(c10 - c00, c11 - c01, f[:, 2]), far - near], -1) / self.spacing  # (k, 3)
+        beyond = (grid - clamped) * self.spacing  # (k, 3) vector from the box to the point
+        away = np.linalg.norm(beyond, axis=1)
+        outside = away > 0
+        if outside.any():
+            value = value + away
+            gradient = np.where(grid == clamped, gradient, 0.0)  # the clamped coordinate no longer varies
+            gradient[outside] += beyond[outside] / away[outside, None]
+        return value, gradient
+
+
+def _signed_distances(mesh: TriangleMesh, low: FloatArray, spacing: float, shape: tuple[int, ...]) -> FloatArray:
+    """Signed distances (x, y, z) at the nodes of a grid."""
+    axes = [low[k] + spacing * np.arange(shape[k]) for k in range(3)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+    locator = Locator.of(mesh)
+    near = locator.closest(nodes, max_distance=BAND * np.sqrt(3.0) * spacing)
+    band = near.found
+    feature = np.zeros_like(nodes)
+    feature[band] = near.points[band].positions(mesh)
+    sign = np.ones(len(nodes))
+    sign[band] = np.where(locator.winding_number(nodes[band]) > 0.5, -1.0, 1.0)
+    nearest = distance_transform_edt(~band.reshape(shape), return_distances=False, return_indices=True)
+    source = np.ravel_multi_index(tuple(nearest), shape).ravel()  # (nodes,) a band node each
+    distance = np.linalg.norm(nodes - feature[source], axis=1)
+    return (sign[source] * distance).reshape(shape)
+
+
+def _mix(a: FloatArray, b: FloatArray, t: FloatArray) -> FloatArray:
+    return a + (b - a) * t
