@@ -1,0 +1,228 @@
+"""What a host can do for the core, as small capabilities. `adapters/README.md` holds the promises, numbered.
+
+A host class inherits from the capabilities that it offers, so a type checker compares the signatures and a
+missing method fails when the host is made; what it does not inherit it declines. Objects are named by ids that
+are unique in the scene and survive reads, undo and saving (never by handles). Lengths are in the host's units,
+axes are the host's axes: the core converts nothing. Frames are the host's own frame numbers or time codes;
+frame None is the scene as it stands, without a key. Refusals are sentences (`contact_core.errors`).
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
+
+from contact_core.arrays import FloatArray
+from contact_core.document.asset import Asset
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.plugins.slots import Picture
+from contact_core.pose.rig import Pose
+
+
+@dataclass(frozen=True)
+class SceneSpace:
+    """Units and axes of a scene. Right-handed; a left-handed host converts and says so in its notes."""
+
+    meters_per_unit: float
+    up_axis: Literal["X", "Y", "Z"]
+    frames_per_second: float = 24.0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One thing to paint on: a surface, or a rig with its skin (whose meshes are not listed again)."""
+
+    id: str
+    name: str
+    kind: Literal["surface", "rig"]
+
+
+@dataclass(frozen=True)
+class StoredDocument:
+    """A document as a host keeps it: opaque bytes, the history's revision, and the schema number of the bytes."""
+
+    data: bytes
+    revision: int
+    schema: int
+
+
+@runtime_checkable
+class HostAdapter(Protocol):
+    """What every host is: `Host(path)` opens a file, `Host()` a new scene, or inside a DCC the open one.
+
+    Opening changes nothing in the scene. Raises FileRefused.
+    """
+
+    name: str  # "memory", "usd", "blender"
+    suffixes: tuple[str, ...]  # of files that it opens, lower case: (".usda", ".usdc")
+
+    @abstractmethod
+    def space(self) -> SceneSpace: ...
+
+
+@runtime_checkable
+class SceneReading(HostAdapter, Protocol):
+    """Meshes. A surface has the object's scale and shear applied (`geometry.placement`), nothing else."""
+
+    @abstractmethod
+    def objects(self) -> tuple[SceneObject, ...]: ...
+
+    @abstractmethod
+    def read_surface(self, object_id: str) -> Asset:
+        """Surface with counter-clockwise triangles also where the object is mirrored, and the maps to the
+        host's own vertices and faces. Same vertex order at each read. A rig's surface is its rest pose."""
+        ...
+
+    @abstractmethod
+    def placement(self, object_id: str, frame: float | None = None) -> FloatArray:
+        """(4, 4) rigid world_from_surface; of a rig, where its space lies in the scene."""
+        ...
+
+
+@runtime_checkable
+class SceneWriting(HostAdapter, Protocol):
+    """Making objects: what an exporter needs."""
+
+    @abstractmethod
+    def add(self, asset: Asset, world_from_surface: Any = None) -> str:
+        """Create the asset's mesh, or its rig with skin, as triangles; the id of the new object."""
+        ...
+
+
+@runtime_checkable
+class RigReading(HostAdapter, Protocol):
+    """Rigs as the analytic `Rig`, joints named uniquely, weights normalised (the asset's notes say so)."""
+
+    @abstractmethod
+    def read_rig(self, object_id: str) -> Asset:
+        """Asset with `rig`. What the analytic rig cannot reproduce is refused by name or told in the notes."""
+        ...
+
+    @abstractmethod
+    def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
+        """The pose in the scene, for all joints of the rig."""
+        ...
+
+    @abstractmethod
+    def skin_points(self, object_id: str, pose: Pose) -> FloatArray:
+        """(n, 3) the host's OWN evaluation of the skin in that pose, in rig space; the scene is left as it was."""
+        ...
+
+
+@runtime_checkable
+class PoseWriting(HostAdapter, Protocol):
+    @abstractmethod
+    def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+        """Set the joints that `pose` names; keyed at `frame` when one is given, and at no other frame."""
+        ...
+
+    @abstractmethod
+    def pose_keys(self, object_id: str) -> tuple[float, ...]:
+        """Frames with a key on any joint, ascending."""
+        ...
+
+
+@runtime_checkable
+class DocumentStorage(HostAdapter, Protocol):
+    """The document lives in the host's own file."""
+
+    @abstractmethod
+    def stored_document(self) -> StoredDocument | None:
+        """What is stored, bit for bit, also under a schema that this core does not know."""
+        ...
+
+    @abstractmethod
+    def store_document(self, document: StoredDocument) -> None:
+        """Replace it. Raises FileRefused, keeping the old one, where that has a newer schema than ours."""
+        ...
+
+    @abstractmethod
+    def save(self, path: Path | None = None) -> None:
+        """Write the scene with its document, whole or not at all; None: where it came from."""
+        ...
+
+
+@runtime_checkable
+class Undo(HostAdapter, Protocol):
+    """The host's own undo, which the core's history follows by revision."""
+
+    @abstractmethod
+    def step(self, label: str) -> AbstractContextManager[None]:
+        """All that is written inside is ONE undo step of the host; after an exception nothing of it stays."""
+        ...
+
+    @abstractmethod
+    def undo(self) -> bool:
+        """What the user's undo does, be the step ours or foreign; False when there is nothing to undo."""
+        ...
+
+    @abstractmethod
+    def redo(self) -> bool: ...
+
+    @abstractmethod
+    def on_undo(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener` after each undo and redo, whoever asked for it; the returned function stops that."""
+        ...
+
+
+@runtime_checkable
+class SelectionReading(HostAdapter, Protocol):
+    """What the user selected in the host becomes a patch."""
+
+    @abstractmethod
+    def selections(self, object_id: str) -> tuple[str, ...]:
+        """Names: the live selection ("selection") where there is one, vertex groups, face sets."""
+        ...
+
+    @abstractmethod
+    def selected_points(self, object_id: str, selection: str) -> SurfacePoints:
+        """The selected vertices, or those of the selected faces, on the surface that `read_surface` gives."""
+        ...
+
+
+@runtime_checkable
+class Display(HostAdapter, Protocol):
+    @abstractmethod
+    def show(self, picture: Picture | None) -> None:
+        """Draw over the scene, in world space, in place of what was shown before; None clears."""
+        ...
+
+
+@runtime_checkable
+class Picking(HostAdapter, Protocol):
+    @abstractmethod
+    def rays(self, pixels: Any) -> tuple[FloatArray, FloatArray]:
+        """World origins (k, 3) and unit directions (k, 3) of the rays through pixel positions (k, 2), y down."""
+        ...
+
+
+@runtime_checkable
+class Progress(HostAdapter, Protocol):
+    @abstractmethod
+    def progress(self, fraction: float, text: str) -> bool:
+        """Tell the user; False when the user asked to cancel."""
+        ...
+
+
+CAPABILITIES: dict[str, type] = {
+    "scene reading": SceneReading,
+    "scene writing": SceneWriting,
+    "rig reading": RigReading,
+    "pose writing": PoseWriting,
+    "document storage": DocumentStorage,
+    "undo": Undo,
+    "selection": SelectionReading,
+    "display": Display,
+    "picking": Picking,
+    "progress": Progress,
+}
+
+
+def capabilities(host: HostAdapter) -> tuple[str, ...]:
+    """Names of what the host offers, in the order of CAPABILITIES."""
+    return tuple(name for name, protocol in CAPABILITIES.items() if isinstance(host, protocol))
