@@ -1,0 +1,127 @@
+"""`python -m contact_viewer.draw SCENE PNG`: draws in a process of its own (see renderer.py).
+
+In software OpenGL the cost is in multi-sampling and in the number of lights (measured: 1.2 s against 0.1 s a
+frame at 100k triangles), so there are none of the first and two of the second; smooth edges come from
+drawing at twice the size.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact_core.plugins.camera import camera_of
+from contact_core.plugins.slots import Picture
+from contact_viewer.scene_file import read_scene
+
+OVERSAMPLE = 2
+_TOP, _BOTTOM = (0.97, 0.97, 0.98), (0.83, 0.85, 0.89)
+_INK, _ALARM = (0.13, 0.15, 0.19), (0.78, 0.10, 0.10)
+
+
+def main(arguments: list[str]) -> int:
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    import pyvista
+
+    if arguments == ["--probe"]:
+        plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
+        plotter.add_mesh(pyvista.Triangle())
+        image = plotter.screenshot(return_img=True)
+        return 0 if np.ptp(image) > 0 else 1
+    pictures, size = read_scene(Path(arguments[0]))
+    draw(pictures, size, Path(arguments[1]))
+    return 0
+
+
+def draw(pictures: list[Picture], size: tuple[int, int], path: Path) -> None:
+    """Draw pictures side by side; size in pixels of the PNG."""
+    import pyvista
+
+    large = (size[0] * OVERSAMPLE, size[1] * OVERSAMPLE)
+    plotter = pyvista.Plotter(
+        off_screen=True, window_size=large, shape=(1, len(pictures)), border=False, lighting="none"
+    )
+    plotter.render_window.SetMultiSamples(0)
+    for place, picture in enumerate(pictures):
+        plotter.subplot(0, place)
+        plotter.set_background(_BOTTOM, top=_TOP)
+        _fill(plotter, pyvista, picture, aspect=size[0] / len(pictures) / size[1], pixels=large[1])
+    _save(plotter.screenshot(return_img=True), path)
+
+
+def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels: int) -> None:
+    camera = camera_of(picture, aspect)
+    for item in picture.meshes:
+        surface = pyvista.PolyData.from_regular_faces(item.mesh.points, item.mesh.faces)
+        surface.point_data["Normals"] = item.mesh.vertex_normals
+        look: dict[str, Any] = {"color": item.color}
+        if item.vertex_colors is not None:
+            surface.point_data["color"] = np.asarray(np.clip(item.vertex_colors, 0, 1) * 255, np.uint8)
+            look = {"scalars": "color", "rgb": True}
+        surface.point_data.active_normals_name = "Normals"
+        plotter.add_mesh(
+            surface, **look, opacity=item.opacity, smooth_shading=True, ambient=0.26, diffuse=0.85, specular=0.07,
+            specular_power=18,
+        )  # fmt: skip
+    towards_eye = camera.eye - camera.centre
+    lift = 0.004 * towards_eye  # dots show on the surface that carries them
+    for points, color in picture.points:
+        if len(points):
+            plotter.add_points(
+                points + lift, color=color, point_size=max(4.0, pixels / 130), render_points_as_spheres=True,
+                lighting=False,
+            )  # fmt: skip
+    for segments, color in picture.lines:
+        if len(segments):
+            ends = np.asarray(segments).reshape(-1, 3) + lift
+            plotter.add_lines(ends, color=color, width=max(2.0, pixels / 500))
+    _light(plotter, pyvista, camera.camera_from_world, camera.centre, float(np.linalg.norm(towards_eye)))
+    plotter.camera.position = camera.eye
+    plotter.camera.focal_point = camera.centre
+    plotter.camera.up = camera.camera_from_world[1]
+    plotter.camera.view_angle = np.degrees(camera.field_of_view)
+    plotter.reset_camera_clipping_range()
+    _write(plotter, picture, pixels)
+
+
+def _light(plotter: Any, pyvista: Any, axes: Any, centre: Any, distance: float) -> None:
+    """A key light from the upper left and a weaker one from the eye."""
+    for direction, strength in ((np.array([-0.45, 0.65, 0.75]), 0.46), (np.array([0.15, 0.0, 1.0]), 0.34)):
+        light = pyvista.Light(
+            position=centre + distance * (direction @ axes),
+            focal_point=centre,
+            intensity=strength,
+            light_type="scene light",
+        )
+        plotter.add_light(light)
+
+
+def _write(plotter: Any, picture: Picture, pixels: int) -> None:
+    """The table from the top left, the caption along the bottom."""
+    size = max(10, pixels // 75)
+    line = size * 1.7
+    for place, (name, value, failed) in enumerate(picture.table):
+        ink = _ALARM if failed else _INK
+        y = pixels - (place + 1.4) * line
+        plotter.add_text(name, position=(size, y), font_size=size / 2, color=ink, font="arial")
+        plotter.add_text(value, position=(size * 16, y), font_size=size / 2, color=ink, font="arial")
+    if picture.caption:
+        plotter.add_text(picture.caption, position=(size, size * 0.8), font_size=size / 2, color=_INK, font="arial")
+
+
+def _save(image: Any, path: Path) -> None:
+    """Average OVERSAMPLE x OVERSAMPLE pixels into one and write the PNG."""
+    from PIL import Image
+
+    height, width = image.shape[0] // OVERSAMPLE, image.shape[1] // OVERSAMPLE
+    blocks = image[: height * OVERSAMPLE, : width * OVERSAMPLE].reshape(height, OVERSAMPLE, width, OVERSAMPLE, -1)
+    Image.fromarray(np.asarray(blocks.mean(axis=(1, 3)) + 0.5, np.uint8)).save(path, format="PNG")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

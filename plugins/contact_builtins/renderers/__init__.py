@@ -1,0 +1,1 @@
+"""Renderers that need nothing but numpy."""

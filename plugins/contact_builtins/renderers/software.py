@@ -1,0 +1,173 @@
+"""The plain software picture: a depth buffer in numpy, for machines without OpenGL.
+
+Triangles, points and lines all become fragments (pixel, depth, colour); the nearest fragment of a pixel
+wins. Each pixel is drawn at twice the size and averaged, which is all the anti-aliasing a report needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from contact_builtins.renderers.font import CELL_HEIGHT, text_mask
+from contact_builtins.renderers.png import write_png
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.errors import InvalidInput
+from contact_core.plugins.camera import Camera, camera_of
+from contact_core.plugins.slots import Picture, PictureMesh
+
+OVERSAMPLE = 2
+_KEY_LIGHT = np.array([-0.45, 0.65, 0.75]) / np.linalg.norm([-0.45, 0.65, 0.75])  # camera axes
+_TOP, _BOTTOM = np.array([0.97, 0.97, 0.98]), np.array([0.84, 0.86, 0.89])  # background
+_INK, _ALARM = np.array([0.13, 0.15, 0.19]), np.array([0.78, 0.10, 0.10])
+_CHUNK = 4_000_000  # fragments drawn at a time
+
+
+class SoftwareRenderer:
+    """Draws everywhere; the last resort of `contact pose`."""
+
+    name = "software"
+    priority = 0
+
+    def unavailable(self) -> str | None:
+        return None
+
+    def render(self, pictures: Sequence[Picture], path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
+        """Draw pictures side by side into one PNG. Raises InvalidInput, FileRefused."""
+        if not pictures or min(size) < 16 or max(size) > 8192:
+            raise InvalidInput(f"a picture needs content and 16 to 8192 pixels a side, but {size} came.")
+        width = size[0] // len(pictures)
+        panels = [draw(picture, (width, size[1])) for picture in pictures]
+        write_png(np.concatenate(panels, axis=1), path)
+
+
+def draw(picture: Picture, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
+    """One picture as (height, width, 3) uint8."""
+    width, height = size[0] * OVERSAMPLE, size[1] * OVERSAMPLE
+    canvas = _Canvas(width, height, camera_of(picture, width / height))
+    for item in picture.meshes:
+        canvas.mesh(item)
+    for points, color in picture.points:
+        canvas.discs(np.asarray(points, float), np.asarray(color), radius=height // 200)
+    for segments, color in picture.lines:
+        canvas.segments(np.asarray(segments, float), np.asarray(color), radius=max(1, height // 700))
+    image = canvas.image.reshape(size[1], OVERSAMPLE, size[0], OVERSAMPLE, 3).mean(axis=(1, 3))
+    _write_text(image, picture)
+    return np.asarray(np.clip(image * 255 + 0.5, 0, 255), np.uint8)
+
+
+class _Canvas:
+    """A picture being drawn: image (height, width, 3) and depth along the camera's view."""
+
+    def __init__(self, width: int, height: int, camera: Camera) -> None:
+        self.width, self.height, self.camera = width, height, camera
+        blend = np.linspace(0, 1, height)[:, None, None]  # (height, 1, 1)
+        self.image: FloatArray = np.broadcast_to(_TOP * (1 - blend) + _BOTTOM * blend, (height, width, 3)).copy()
+        self.depth: FloatArray = np.full(height * width, np.inf)
+        self.focal = 0.5 * height / np.tan(camera.field_of_view / 2)
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """(n, 3) pixel x, pixel y and depth of world points (n, 3)."""
+        seen = (points - self.camera.eye) @ self.camera.camera_from_world.T
+        depth = np.maximum(-seen[:, 2], 1e-9)
+        x = 0.5 * self.width + self.focal * seen[:, 0] / depth
+        y = 0.5 * self.height - self.focal * seen[:, 1] / depth
+        return np.stack([x, y, depth], axis=1)
+
+    def mesh(self, item: PictureMesh) -> None:
+        """Shaded triangles; a transparent mesh is drawn on a checker of pixels (screen-door)."""
+        projected = self.project(item.mesh.points)
+        shade = _shade(item.mesh.vertex_normals @ self.camera.camera_from_world.T)  # (n,)
+        base = np.asarray(item.color) if item.vertex_colors is None else item.vertex_colors
+        colors = np.clip(np.broadcast_to(base, projected.shape) * shade[:, None], 0, 1)  # (n, 3)
+        corners = projected[item.mesh.faces]  # (m, 3, 3)
+        low = np.floor(corners[:, :, :2].min(axis=1)).astype(np.int64)  # (m, 2)
+        span = np.ceil(corners[:, :, :2].max(axis=1)).astype(np.int64) - low + 1  # (m, 2)
+        side = 1 << np.ceil(np.log2(np.clip(span.max(axis=1), 1, 8192))).astype(np.int64)  # (m,)
+        for extent in np.unique(side):  # triangles of one size class share one grid of pixel offsets
+            members = np.flatnonzero(side == extent)
+            for start in range(0, len(members), max(1, _CHUNK // int(extent) ** 2)):
+                chosen = members[start : start + max(1, _CHUNK // int(extent) ** 2)]
+                self._triangles(
+                    corners[chosen], colors[item.mesh.faces[chosen]], low[chosen], int(extent), item.opacity
+                )
+
+    def _triangles(
+        self, corners: FloatArray, colors: FloatArray, low: IntArray, extent: int, opacity: float
+    ) -> None:
+        offset = np.stack(np.meshgrid(np.arange(extent), np.arange(extent), indexing="xy"), -1).reshape(-1, 2)
+        pixels = low[:, None, :] + offset  # (m, extent^2, 2)
+        a, b, c = (corners[:, None, k, :2] for k in range(3))
+        area = _cross(b - a, c - a)  # (m, 1)
+        at = pixels + 0.5
+        with np.errstate(divide="ignore", invalid="ignore"):
+            weights = (
+                np.stack([_cross(b - at, c - at), _cross(c - at, a - at), _cross(a - at, b - at)], -1)
+                / area[..., None]
+            )
+        covered = (weights >= 0).all(axis=-1)  # NaN of an edge-on triangle compares False
+        if opacity < 1.0:
+            covered &= ((pixels * (7, 13)).sum(axis=-1) % 16) < 16 * opacity
+        which, where = np.nonzero(covered)
+        weight = weights[which, where]  # (f, 3)
+        depth = (weight * corners[which, :, 2]).sum(axis=1)
+        self.fragments(pixels[which, where], depth, np.einsum("fc,fci->fi", weight, colors[which]))
+
+    def discs(self, points: FloatArray, color: FloatArray, radius: int) -> None:
+        """Round dots, pulled a little towards the eye so that they show on the surface that carries them."""
+        if not len(points):
+            return
+        projected = self.project(points)
+        reach = np.arange(-radius, radius + 1)
+        offset = np.stack(np.meshgrid(reach, reach), -1).reshape(-1, 2)
+        offset = offset[(offset**2).sum(axis=1) <= radius * radius]  # (o, 2)
+        pixels = (projected[:, None, :2].astype(np.int64) + offset).reshape(-1, 2)
+        depth = np.repeat(projected[:, 2], len(offset)) * 0.995
+        self.fragments(pixels, depth, np.broadcast_to(color, (len(pixels), 3)))
+
+    def segments(self, segments: FloatArray, color: FloatArray, radius: int) -> None:
+        """Lines (k, 2, 3) as rows of dots."""
+        if not len(segments):
+            return
+        ends = self.project(segments.reshape(-1, 3)).reshape(-1, 2, 3)
+        count = int(np.clip(np.abs(ends[:, 1, :2] - ends[:, 0, :2]).max(), 2, 4096))
+        t = np.linspace(0, 1, count)[:, None]
+        self.discs((segments[:, :1] * (1 - t) + segments[:, 1:] * t).reshape(-1, 3), color, radius)
+
+    def fragments(self, pixels: IntArray, depth: FloatArray, colors: FloatArray) -> None:
+        """Depth-tested writes: pixels (f, 2), depth (f,), colors (f, 3)."""
+        inside = ((pixels >= 0) & (pixels < (self.width, self.height))).all(axis=1)
+        index = pixels[inside, 1] * self.width + pixels[inside, 0]
+        depth, colors = depth[inside], colors[inside]
+        np.minimum.at(self.depth, index, depth)
+        nearest = depth <= self.depth[index]
+        self.image.reshape(-1, 3)[index[nearest]] = colors[nearest]
+
+
+def _shade(normals: FloatArray) -> FloatArray:
+    """(n,) brightness under a soft key light from upper left and a headlight; both sides are lit."""
+    key = np.clip(0.5 + 0.5 * normals @ _KEY_LIGHT, 0, 1) ** 1.5
+    head = np.abs(normals[:, 2])
+    return np.asarray(0.28 + 0.5 * key + 0.3 * head)
+
+
+def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+
+def _write_text(image: FloatArray, picture: Picture) -> None:
+    """Table rows from the top left, the caption along the bottom; red for what failed."""
+    scale = max(1, image.shape[0] // 450)
+    line = (CELL_HEIGHT + 2) * scale
+    rows = [(f"{name:<22.22} {value}", _ALARM if failed else _INK) for name, value, failed in picture.table]
+    for place, (text, ink) in enumerate(rows):
+        _stamp(image, text, 8, 8 + place * line, scale, ink)
+    _stamp(image, picture.caption, 8, image.shape[0] - line - 4, scale, _INK)
+
+
+def _stamp(image: FloatArray, text: str, x: int, y: int, scale: int, ink: FloatArray) -> None:
+    mask = text_mask(text, scale)[: max(0, image.shape[0] - y), : max(0, image.shape[1] - x)]
+    image[y : y + mask.shape[0], x : x + mask.shape[1]][mask] = ink
