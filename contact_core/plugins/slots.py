@@ -7,17 +7,19 @@ The protocols of the other slots live with what they serve: `contact.brush.Brush
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
-from contact_core.arrays import FloatArray
-from contact_core.document.asset import Asset
-from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Pose, Rig
+if TYPE_CHECKING:  # so that `contact --help`, which asks for sub-commands, loads no numpy
+    import argparse
+    from pathlib import Path
+
+    from contact_core.arrays import FloatArray
+    from contact_core.document.asset import Asset
+    from contact_core.geometry.mesh import TriangleMesh
+    from contact_core.geometry.surface_point import SurfacePoints
+    from contact_core.pose.rig import Pose, Rig
 
 
 @runtime_checkable

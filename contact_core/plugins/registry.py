@@ -1,0 +1,133 @@
+"""The slots that plugins fill, and what an object must have to fill one."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from contact_core.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from contact_core.contact.axis_generator import AxisGenerator
+    from contact_core.contact.brush import Brush
+    from contact_core.edit.command import Command
+    from contact_core.geometry.engine import GeodesicEngine
+    from contact_core.host import HostAdapter
+    from contact_core.plugins.slots import CliCommand, Format, Placer, Renderer, Sample
+    from contact_core.pose.solver import PoseSolver
+    from contact_core.pose.terms import PoseTerm
+
+T_co = TypeVar("T_co", covariant=True)
+
+
+@dataclass(frozen=True)
+class Slot(Generic[T_co]):
+    """One kind of thing that plugins offer.
+
+    hook: the hook that asks for it.  noun: what people call it.  protocol: "module:Name" of what it must satisfy.
+    key: the attribute that names an object.  instances: whether the slot holds instances (else classes).
+    """
+
+    hook: str
+    noun: str
+    protocol: str
+    key: str = "name"
+    instances: bool = True
+
+
+BRUSHES: Slot[Brush] = Slot("contact_brushes", "brush", "contact_core.contact.brush:Brush")
+AXIS_GENERATORS: Slot[AxisGenerator] = Slot(
+    "contact_axis_generators", "axis generator", "contact_core.contact.axis_generator:AxisGenerator"
+)
+PLACERS: Slot[Placer] = Slot("contact_placers", "placer", "contact_core.plugins.slots:Placer")
+POSE_SOLVERS: Slot[PoseSolver] = Slot("contact_pose_solvers", "pose solver", "contact_core.pose.solver:PoseSolver")
+POSE_TERMS: Slot[PoseTerm] = Slot("contact_pose_terms", "pose term", "contact_core.pose.terms:PoseTerm")
+GEODESIC_ENGINES: Slot[GeodesicEngine] = Slot(
+    "contact_geodesic_engines", "geodesic engine", "contact_core.geometry.engine:GeodesicEngine"
+)
+HOSTS: Slot[type[HostAdapter]] = Slot("contact_hosts", "host", "contact_core.host:HostAdapter", instances=False)
+FORMATS: Slot[Format] = Slot("contact_formats", "format", "contact_core.plugins.slots:Format")
+RENDERERS: Slot[Renderer] = Slot("contact_renderers", "renderer", "contact_core.plugins.slots:Renderer")
+SAMPLES: Slot[Sample] = Slot("contact_samples", "sample", "contact_core.plugins.slots:Sample")
+COMMANDS: Slot[type[Command]] = Slot(
+    "contact_commands", "command", "contact_core.edit.command:Command", key="json_id", instances=False
+)
+CLI: Slot[CliCommand] = Slot("contact_cli", "sub-command", "contact_core.plugins.slots:CliCommand")
+
+SLOTS: tuple[Slot[Any], ...] = (
+    BRUSHES,
+    AXIS_GENERATORS,
+    PLACERS,
+    POSE_SOLVERS,
+    POSE_TERMS,
+    GEODESIC_ENGINES,
+    HOSTS,
+    FORMATS,
+    RENDERERS,
+    SAMPLES,
+    COMMANDS,
+    CLI,
+)
+
+
+def resolve(reference: str) -> Any:
+    """The object behind "package.module:Name". Raises InvalidInput for another spelling; import errors pass."""
+    module, colon, name = reference.partition(":")
+    if not colon or not module or not name:
+        raise InvalidInput(f'a reference is spelt "package.module:Name", but {reference!r} came.')
+    found = import_module(module)
+    if not hasattr(found, name):
+        near = difflib.get_close_matches(name, dir(found), n=3)
+        raise InvalidInput(f"{module} has no {name!r}" + (f"; it has {', '.join(near)}." if near else "."))
+    return getattr(found, name)
+
+
+def shortcomings(candidate: object, slot: Slot[Any]) -> list[str]:
+    """What keeps an object from filling a slot, in words; empty when nothing does."""
+    result = []
+    for name, member in _members(resolve(slot.protocol)).items():
+        if not hasattr(candidate, name):
+            if slot.instances or callable(member):  # a class need not show what its instances will hold
+                result.append(f"has no {name}" + ("()" if callable(member) else ""))
+        elif callable(member):
+            result += _call_shortcomings(name, member, getattr(candidate, name), bound=slot.instances)
+    key = getattr(candidate, slot.key, None)
+    if not (isinstance(key, str) and key):
+        result.append(f"needs a {slot.key}, a non-empty string, but has {key!r}")
+    return result
+
+
+def _members(protocol: type) -> dict[str, Any]:
+    """Public members of a protocol by name: its functions, and None for plain attributes and properties."""
+    result: dict[str, Any] = {}
+    for base in reversed(protocol.__mro__):
+        if not getattr(base, "_is_protocol", False):
+            continue
+        for name in inspect.get_annotations(base):
+            result.setdefault(name, None)
+        for name, member in vars(base).items():
+            if not name.startswith("_"):
+                result[name] = member if inspect.isfunction(member) else None
+    return {name: member for name, member in result.items() if not name.startswith("_")}
+
+
+def _call_shortcomings(name: str, wanted: Any, offered: Any, *, bound: bool) -> list[str]:
+    """Whether `offered` can be called as the protocol's method is."""
+    if not callable(offered):
+        return [f"{name} is {type(offered).__name__}, not a method"]
+    try:
+        signature = inspect.signature(offered)
+    except (TypeError, ValueError):  # a builtin without a signature: nothing to compare
+        return []
+    parameters = list(inspect.signature(wanted).parameters.values())[1 if bound else 0 :]
+    positional = [p.name for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD and p.default is p.empty]
+    keywords = {p.name: None for p in parameters if p.kind is p.KEYWORD_ONLY}
+    try:
+        signature.bind(*positional, **keywords)
+    except TypeError as error:
+        asked = ", ".join([*positional, *(f"{key}=" for key in keywords)])
+        return [f"{name}{signature} cannot be called as {name}({asked}): {error}"]
+    return []

@@ -1,0 +1,72 @@
+"""What contact-core brings itself, registered exactly as a studio's plugin would be.
+
+Each line is a reference, imported when the slot is first asked for it: a missing optional library takes away
+one object and shows in `contact plugins`. Add yours as one line.
+"""
+
+from __future__ import annotations
+
+from contact_core.plugins import hookimpl
+
+
+@hookimpl
+def contact_brushes() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_axis_generators() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_placers() -> list[object]:
+    return [
+        "contact_builtins.placers.from_pose:FromPose",
+        "contact_builtins.placers.naive:Naive",
+    ]
+
+
+@hookimpl
+def contact_pose_solvers() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_pose_terms() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_geodesic_engines() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_hosts() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_formats() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_renderers() -> list[object]:
+    return ["contact_builtins.renderers.software:SoftwareRenderer"]
+
+
+@hookimpl
+def contact_samples() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_commands() -> list[object]:
+    return []
+
+
+@hookimpl
+def contact_cli() -> list[object]:
+    return []

@@ -1,0 +1,29 @@
+"""What every test may ask for."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The root of the source tree."""
+    return REPOSITORY
+
+
+@pytest.fixture(scope="session")
+def assets() -> Path:
+    """The folder of real assets ($CONTACT_ASSETS, else ../shared/assets); skips where there is none."""
+    places = [Path(os.environ["CONTACT_ASSETS"])] if os.environ.get("CONTACT_ASSETS") else []
+    places.append(REPOSITORY.parent / "shared" / "assets")
+    for place in places:
+        if place.is_dir():
+            return place
+    pytest.skip("the real assets are not here: set CONTACT_ASSETS to their folder")
