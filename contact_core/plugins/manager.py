@@ -48,8 +48,8 @@ class PluginRecord:
 class PluginManager:
     """The plugins of one session.
 
-    plugins: modules or objects with hook implementations, of highest precedence.  discover: whether entry points and
-    CONTACT_PLUGINS are read; tests say False.  Precedence: session > CONTACT_PLUGINS > entry points > built-ins.
+    plugins: modules or objects with hook implementations, of highest precedence.  discover: whether entry points
+    and CONTACT_PLUGINS are read; tests say False.  Precedence: session > CONTACT_PLUGINS > entry point > built-in.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class PluginManager:
         )
 
     def choose(self, hook: str, offered: Iterable[str], **arguments: Any) -> str | None:
-        """Ask a `contact_choose_*` hook, highest precedence first; an answer not among `offered` is written down."""
+        """Ask a `contact_choose_*` hook, highest precedence first; an answer that is not `offered` is noted."""
         names = tuple(offered)
         for record in reversed(self._records.values()):
             answer = self._call(record, hook, {**arguments, "offered": names})
