@@ -19,7 +19,9 @@ _REPORT = pytest.StashKey[ContractReport]()
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("contact", "contact-core contract suites")
     group.addoption("--contact-report", action="store_true", help="print which subject keeps which clause")
-    group.addoption("--contact-report-file", metavar="PATH", help="write the same as Markdown")
+    group.addoption(
+        "--contact-report-file", metavar="PATH", help="write the same as Markdown or, for a name in .json, as JSON"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -62,4 +64,5 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         terminalreporter.write_line(report.text() or "no contract suite ran")
     path = config.getoption("--contact-report-file")
     if path:
-        Path(path).write_text(report.markdown(), encoding="utf-8")
+        text = report.json() if path.endswith(".json") else report.markdown()
+        Path(path).write_text(text, encoding="utf-8")

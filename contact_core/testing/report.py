@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 
 PROPERTY = "contact_clause"
@@ -80,6 +81,12 @@ class ContractReport:
                 lines.append(f"  {clause:<4}{cells}  {text}")
         lines += [f"{key[1]} declines {key[2]}: {reason}" for key, reason in sorted(self.reasons.items())]
         return "\n".join(lines)
+
+    def json(self) -> str:
+        """For other programs: outcomes by contract, subject and clause, and the broken clauses by subject."""
+        outcomes = [[*key, outcome] for key, outcome in sorted(self.outcomes.items())]
+        reasons = [[*key, reason] for key, reason in sorted(self.reasons.items())]
+        return json.dumps({"outcomes": outcomes, "declined": reasons, "broken": self.broken()}, indent=1) + "\n"
 
     def markdown(self) -> str:
         """For docs/contract-report.md."""
