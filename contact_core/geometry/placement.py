@@ -72,6 +72,7 @@ def split_world_from_local(world_from_local: Any) -> Placement:
 
 def _rounded(stretch: FloatArray, largest: float) -> FloatArray:
     """To multiples of 1, 2 or 5 times a power of ten, so that scales as people write them stay as they are."""
-    decimals = -int(np.floor(np.log10(_ROUNDING * largest)))
-    step = max(m for m in (1, 2, 5) if m * 10.0**-decimals <= _ROUNDING * largest) * 10.0**-decimals
+    wanted = _ROUNDING * largest * (1 + 1e-6)  # a little more, so that 0.5 and 0.49999999 get the same step
+    decimals = -int(np.floor(np.log10(wanted)))
+    step = max(m for m in (1, 2, 5) if m * 10.0**-decimals <= wanted) * 10.0**-decimals
     return np.asarray(np.round(np.round(stretch / step) * step, decimals) + 0.0)
