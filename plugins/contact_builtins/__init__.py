@@ -59,7 +59,11 @@ def contact_renderers() -> list[object]:
 
 @hookimpl
 def contact_samples() -> list[object]:
-    return []
+    return [
+        "contact_builtins.samples.catalogue:HUMAN_HAND",
+        "contact_builtins.samples.catalogue:MUG",
+        "contact_builtins.samples.catalogue:BASEBALL",
+    ]
 
 
 @hookimpl

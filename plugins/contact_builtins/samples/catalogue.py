@@ -1,0 +1,64 @@
+"""The built-in samples: what each is, how it is made, and the cache that makes the second call instant."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.resources import files
+from typing import Literal
+
+from contact_builtins.samples.packing import pack, unpack
+from contact_core.cache import cached_arrays
+from contact_core.document.asset import Asset
+from contact_core.errors import InvalidInput
+
+PACKAGE = "contact_builtins.samples"
+
+
+@dataclass(frozen=True)
+class GeneratedSample:
+    """A sample whose module in this package has `build() -> Asset`."""
+
+    name: str
+    kind: Literal["manipulator", "object"]
+    summary: str
+    builder: str = field(repr=False)  # "module:function"
+
+    def build(self) -> Asset:
+        """The asset, out of the cache or made now (seconds)."""
+        try:
+            return unpack(
+                cached_arrays("samples", f"{self.name}-{generator_version()}", lambda: pack(self.generate()))
+            )
+        except InvalidInput:  # the cache holds something else under this name: it costs time, nothing more
+            return self.generate()
+
+    def generate(self) -> Asset:
+        """Make the asset, whatever the cache holds."""
+        module, function = self.builder.split(":")
+        make: Callable[[], Asset] = getattr(import_module(f"{PACKAGE}.{module}"), function)
+        return make()
+
+
+def generator_version() -> str:
+    """Digest of this package's sources: a changed generator never meets an old cache."""
+    state = hashlib.sha256()
+    for source in sorted(files(PACKAGE).iterdir(), key=lambda entry: entry.name):
+        if source.name.endswith(".py"):
+            state.update(source.read_bytes())
+    return state.hexdigest()[:16]
+
+
+def sample(name: str) -> GeneratedSample:
+    """A built-in sample by name."""
+    return next(s for s in ALL if s.name == name)
+
+
+HUMAN_HAND = GeneratedSample(
+    "human_hand", "manipulator", "a right human hand, 18 cm, 25 joints, open and relaxed", "human_hand:build"
+)
+MUG = GeneratedSample("mug", "object", "a mug with a handle (genus 1)", "mug:build")
+BASEBALL = GeneratedSample("baseball", "object", "a baseball with its seam", "baseball:build")
+ALL = (HUMAN_HAND, MUG, BASEBALL)
