@@ -32,7 +32,7 @@ def test_the_parts_make_the_whole_and_the_placement_is_rigid(turn, scale, shift,
     assert np.allclose(rigid @ rigid.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(rigid) > 0
     whole = rigid @ placement.surface_from_local
-    assert np.abs(whole - world[:3, :3]).max() <= 2e-6 * np.abs(world[:3, :3]).max() + 1e-12
+    assert np.abs(whole - world[:3, :3]).max() <= 2e-6 * np.linalg.norm(world[:3, :3], 2) + 1e-12
     assert placement.mirrored == (np.linalg.det(world[:3, :3]) < 0)
 
 
