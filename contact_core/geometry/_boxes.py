@@ -1,11 +1,11 @@
-"""Kernels of the locator: an implicit tree of boxes over Morton-sorted triangles (see raycast.py)."""
+"""Kernels of the locator: an implicit tree of boxes over triangles sorted by medians (see raycast.py)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import kernel
@@ -34,43 +34,74 @@ class Dipoles(NamedTuple):
 
 
 def build(points: FloatArray, faces: IntArray) -> Tree:
-    """The tree over faces (m, 3) of points (n, 3), by sorting and reductions."""
+    """The tree over faces (m, 3) of points (n, 3)."""
     corners = points[faces]  # (m, 3, 3)
-    centres = corners.mean(axis=1)
-    low, extent = centres.min(axis=0), np.ptp(centres, axis=0)
-    cells = ((centres - low) / np.where(extent > 0, extent, 1.0) * (2**21 - 1)).astype(np.uint64)  # (m, 3)
-    code = np.zeros(len(faces), np.uint64)
-    for axis in range(3):
-        code |= _spread(cells[:, axis]) << np.uint64(axis)
-    order = np.argsort(code, kind="stable").astype(np.int64)
     leaves = 1 << max(0, int(np.ceil(np.log2(len(faces) / LEAF_SIZE))))
     leaves = min(leaves, 1 << int(np.log2(len(faces))))  # no leaf may be empty
     starts = np.arange(leaves + 1, dtype=np.int64) * len(faces) // leaves
-    triangles = corners[order].reshape(-1, 9)
-    boxes_low, boxes_high = np.empty((2 * leaves - 1, 3)), np.empty((2 * leaves - 1, 3))
-    sorted_corners = corners[order]
-    boxes_low[leaves - 1 :] = np.minimum.reduceat(sorted_corners.min(axis=1), starts[:-1], axis=0)
-    boxes_high[leaves - 1 :] = np.maximum.reduceat(sorted_corners.max(axis=1), starts[:-1], axis=0)
+    order = np.arange(len(faces), dtype=np.int64)
+    _sort_by_medians(np.ascontiguousarray(corners.mean(axis=1)), starts, order)
+    corners = np.ascontiguousarray(corners[order])
+    low, high = np.empty((2 * leaves - 1, 3)), np.empty((2 * leaves - 1, 3))
+    low[leaves - 1 :] = np.minimum.reduceat(corners.min(axis=1), starts[:-1], axis=0)
+    high[leaves - 1 :] = np.maximum.reduceat(corners.max(axis=1), starts[:-1], axis=0)
+    for level, children in _levels(leaves):
+        low[level] = low[children].reshape(-1, 2, 3).min(axis=1)
+        high[level] = high[children].reshape(-1, 2, 3).max(axis=1)
+    return Tree(order, corners.reshape(-1, 9), low, high, starts)
+
+
+def _levels(leaves: int) -> Iterator[tuple[slice, slice]]:
+    """The inner nodes level by level, lowest first, each with the slice of their children."""
     first = leaves // 2
-    while first >= 1:  # nodes first - 1 .. 2 first - 2 are one level
-        level, children = slice(first - 1, 2 * first - 1), slice(2 * first - 1, 4 * first - 1)
-        boxes_low[level] = boxes_low[children].reshape(-1, 2, 3).min(axis=1)
-        boxes_high[level] = boxes_high[children].reshape(-1, 2, 3).max(axis=1)
+    while first >= 1:
+        yield slice(first - 1, 2 * first - 1), slice(2 * first - 1, 4 * first - 1)
         first //= 2
-    return Tree(order, triangles, boxes_low, boxes_high, starts)
 
 
-def _spread(value: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
-    """Put two zero bits between the 21 bits of each value (Morton code)."""
-    for shift, mask in (
-        (32, 0x1F00000000FFFF),
-        (16, 0x1F0000FF0000FF),
-        (8, 0x100F00F00F00F00F),
-        (4, 0x10C30C30C30C30C3),
-        (2, 0x1249249249249249),
-    ):
-        value = (value | (value << np.uint64(shift))) & np.uint64(mask)
-    return value
+@kernel
+def _sort_by_medians(centres, starts, order):  # type: ignore[no-untyped-def]
+    """Sort faces so that each half of each node's run lies on one side of the median on its longest axis."""
+    leaves = len(starts) - 1
+    nodes = 1
+    while nodes < leaves:
+        step = leaves // nodes
+        for node in range(nodes):
+            first, last = starts[node * step], starts[(node + 1) * step]
+            axis = 0
+            widest = -1.0
+            for k in range(3):
+                low, high = np.inf, -np.inf
+                for i in range(first, last):
+                    low = min(low, centres[order[i], k])
+                    high = max(high, centres[order[i], k])
+                if high - low > widest:
+                    axis, widest = k, high - low
+            _select(centres, axis, order, first, last - 1, starts[node * step + step // 2])
+        nodes *= 2
+
+
+@kernel
+def _select(centres, axis, order, first, last, middle):  # type: ignore[no-untyped-def]
+    """Hoare's selection: entry `middle` of order gets its sorted place, smaller ones before it, larger after."""
+    while first < last:
+        pivot = centres[order[(first + last) // 2], axis]
+        i, j = first, last
+        while i <= j:
+            while centres[order[i], axis] < pivot:
+                i += 1
+            while centres[order[j], axis] > pivot:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            last = j
+        elif middle >= i:
+            first = i
+        else:
+            return
 
 
 def dipoles(tree: Tree) -> Dipoles:
@@ -83,149 +114,168 @@ def dipoles(tree: Tree) -> Dipoles:
     area[leaves - 1 :] = np.add.reduceat(vector, tree.starts[:-1], axis=0)
     moment[leaves - 1 :] = np.add.reduceat(corners.mean(axis=1) * weight[:, None], tree.starts[:-1], axis=0)
     mass[leaves - 1 :] = np.add.reduceat(weight, tree.starts[:-1])
-    first = leaves // 2
-    while first >= 1:
-        level, children = slice(first - 1, 2 * first - 1), slice(2 * first - 1, 4 * first - 1)
+    for level, children in _levels(leaves):
         for values in (area, moment):
             values[level] = values[children].reshape(-1, 2, 3).sum(axis=1)
         mass[level] = mass[children].reshape(-1, 2).sum(axis=1)
-        first //= 2
     middle = 0.5 * (tree.low + tree.high)
     centre = np.where(mass[:, None] > 0, moment / np.maximum(mass, 1e-300)[:, None], middle)
     reach = np.maximum(tree.high - centre, centre - tree.low)  # (N, 3) farthest corner of the box, per axis
     return Dipoles(area, centre, np.linalg.norm(reach, axis=1))
 
 
-@kernel
-def _box_entry(low: FloatArray, high: FloatArray, node: int, origin: FloatArray, inverse: FloatArray) -> float:
-    """Where a ray enters a node's box, inf if it misses it; the slab test, kept conservative by one rounding."""
-    near = 0.0
-    far = np.inf
-    for axis in range(3):
-        a = (low[node, axis] - origin[axis]) * inverse[axis]
-        b = (high[node, axis] - origin[axis]) * inverse[axis]
-        if a > b:
-            a, b = b, a
-        # NaN (0 * inf: the origin lies in a slab's plane) compares false and leaves the interval alone.
-        if a > near:
-            near = a
-        if b < far:
-            far = b
-    if near > far * (1.0 + 4e-16):
-        return np.inf
-    return near
+# The kernels below allocate nothing and take flat arrays: the callers own results and scratch memory.
 
 
-@kernel
-def _cast_one(
-    tree: Tree, origin: FloatArray, direction: FloatArray, limit: float, stack: IntArray, out: FloatArray
-) -> int:
-    """First hit of one ray: the sorted triangle (-1: none); out = (distance, u, v, w)."""
-    order, triangles, low, high, starts = tree
-    leaves = len(starts) - 1
-    inverse = np.empty(3)
-    kz = 0
-    for axis in range(3):
-        inverse[axis] = 1.0 / direction[axis] if direction[axis] != 0.0 else np.inf
-        if abs(direction[axis]) > abs(direction[kz]):
-            kz = axis
-    kx = (kz + 1) % 3
-    ky = (kz + 2) % 3
-    sx = direction[kx] / direction[kz]
-    sy = direction[ky] / direction[kz]
-    sz = 1.0 / direction[kz]
-    best = limit
-    found = -1
-    top = 0
-    stack[0] = 0
-    while top >= 0:
-        node = stack[top]
-        top -= 1
-        if _box_entry(low, high, node, origin, inverse) > best:
-            continue
-        if node < leaves - 1:
-            left = _box_entry(low, high, 2 * node + 1, origin, inverse)
-            right = _box_entry(low, high, 2 * node + 2, origin, inverse)
-            near_child = 2 * node + 1 if left <= right else 2 * node + 2
-            far_child = 4 * node + 3 - near_child
-            if max(left, right) <= best and max(left, right) < np.inf:
-                top += 1
-                stack[top] = far_child
-            if min(left, right) <= best and min(left, right) < np.inf:
-                top += 1
-                stack[top] = near_child
-            continue
-        for t in range(starts[node - leaves + 1], starts[node - leaves + 2]):
-            az = triangles[t, kz] - origin[kz]
-            bz = triangles[t, 3 + kz] - origin[kz]
-            cz = triangles[t, 6 + kz] - origin[kz]
-            ax = triangles[t, kx] - origin[kx] - sx * az
-            ay = triangles[t, ky] - origin[ky] - sy * az
-            bx = triangles[t, 3 + kx] - origin[kx] - sx * bz
-            by = triangles[t, 3 + ky] - origin[ky] - sy * bz
-            cx = triangles[t, 6 + kx] - origin[kx] - sx * cz
-            cy = triangles[t, 6 + ky] - origin[ky] - sy * cz
-            u = cx * by - cy * bx
-            v = ax * cy - ay * cx
-            w = bx * ay - by * ax
-            if (u < 0.0 or v < 0.0 or w < 0.0) and (u > 0.0 or v > 0.0 or w > 0.0):
-                continue
-            total = u + v + w
-            if total == 0.0:
-                continue
-            distance = sz * (u * az + v * bz + w * cz) / total
-            if distance < 0.0 or distance > best:
-                continue
-            if distance == best and found >= 0 and order[t] > order[found]:
-                continue
-            best = distance
-            found = t
-            out[0] = distance
-            out[1] = u / total
-            out[2] = v / total
-            out[3] = w / total
-    return found
-
-
-@kernel
 def cast(
     tree: Tree, origins: FloatArray, directions: FloatArray, limit: float
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """First hits of k rays: faces (k,), barycentric (k, 3), distance (k,)."""
-    k = len(origins)
-    faces = np.full(k, -1, np.int64)
-    barycentric = np.zeros((k, 3))
-    barycentric[:, 0] = 1.0
-    distance = np.full(k, np.inf)
-    stack = np.empty(STACK, np.int64)
-    out = np.empty(4)
-    for i in range(k):
-        t = _cast_one(tree, origins[i], directions[i], limit, stack, out)
-        if t >= 0:
-            faces[i] = tree[0][t]
-            distance[i] = out[0]
-            barycentric[i] = out[1:]
+    """First hits of k rays: faces (k,; -1 none), barycentric (k, 3), distance (k,)."""
+    faces, barycentric, distance = _blank(len(origins))
+    _cast(*tree, origins, directions, limit, np.empty(STACK, np.int64), faces, barycentric, distance)
     return faces, barycentric, distance
 
 
+def closest(
+    tree: Tree, normals: FloatArray, points: FloatArray, facing: FloatArray, facing_limit: float, limit: float
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Closest points of k queries: faces (-1: none), barycentric (k, 3), distance. facing: (k, 3) or (0, 3)."""
+    faces, barycentric, distance = _blank(len(points))
+    scratch = np.empty(3), np.empty(STACK, np.int64)
+    _closest(*tree, normals, points, facing, facing_limit, limit, *scratch, faces, barycentric, distance)
+    return faces, barycentric, distance
+
+
+def winding(tree: Tree, nodes: Dipoles, points: FloatArray, accuracy: float) -> FloatArray:
+    """(k,) generalised winding numbers of points (k, 3)."""
+    result = np.zeros(len(points))
+    _winding(tree.triangles, tree.starts, *nodes, points, accuracy, np.empty(STACK, np.int64), result)
+    return result
+
+
+def _blank(k: int) -> tuple[IntArray, FloatArray, FloatArray]:
+    return np.full(k, -1, np.int64), np.tile([1.0, 0.0, 0.0], (k, 1)), np.full(k, np.inf)
+
+
 @kernel
-def _box_distance(low: FloatArray, high: FloatArray, node: int, p: FloatArray) -> float:
+def _box_entry(low, high, node, ox, oy, oz, ix, iy, iz):  # type: ignore[no-untyped-def]
+    """Where a ray enters a node's box, inf if it misses it: the slab test, kept conservative by rounding out."""
+    ax, bx = (low[node, 0] - ox) * ix, (high[node, 0] - ox) * ix
+    ay, by = (low[node, 1] - oy) * iy, (high[node, 1] - oy) * iy
+    az, bz = (low[node, 2] - oz) * iz, (high[node, 2] - oz) * iz
+    near, far = 0.0, np.inf
+    # NaN (0 * inf: the origin lies in a slab's plane) compares false and leaves the interval alone.
+    if min(ax, bx) > near:
+        near = min(ax, bx)
+    if max(ax, bx) < far:
+        far = max(ax, bx)
+    if min(ay, by) > near:
+        near = min(ay, by)
+    if max(ay, by) < far:
+        far = max(ay, by)
+    if min(az, bz) > near:
+        near = min(az, bz)
+    if max(az, bz) < far:
+        far = max(az, bz)
+    return near if near <= far * (1.0 + 4e-16) else np.inf
+
+
+@kernel
+def _cast(order, triangles, low, high, starts, origins, directions, limit, stack, faces, barycentric, distances):  # type: ignore[no-untyped-def]
+    """First hits of rays into faces, barycentric, distances."""
+    leaves = len(starts) - 1
+    for i in range(len(origins)):
+        kz = 0
+        for axis in range(1, 3):
+            if abs(directions[i, axis]) > abs(directions[i, kz]):
+                kz = axis
+        kx = (kz + 1) % 3
+        ky = (kz + 2) % 3
+        sx = directions[i, kx] / directions[i, kz]
+        sy = directions[i, ky] / directions[i, kz]
+        sz = 1.0 / directions[i, kz]
+        ox, oy, oz = origins[i, 0], origins[i, 1], origins[i, 2]
+        ix = 1.0 / directions[i, 0] if directions[i, 0] != 0.0 else np.inf
+        iy = 1.0 / directions[i, 1] if directions[i, 1] != 0.0 else np.inf
+        iz = 1.0 / directions[i, 2] if directions[i, 2] != 0.0 else np.inf
+        best = limit
+        found = -1
+        top = 0
+        stack[0] = 0
+        while top >= 0:
+            node = stack[top]
+            top -= 1
+            if _box_entry(low, high, node, ox, oy, oz, ix, iy, iz) > best:
+                continue
+            if node < leaves - 1:
+                left = _box_entry(low, high, 2 * node + 1, ox, oy, oz, ix, iy, iz)
+                right = _box_entry(low, high, 2 * node + 2, ox, oy, oz, ix, iy, iz)
+                near_child = 2 * node + 1 if left <= right else 2 * node + 2
+                if max(left, right) <= best and max(left, right) < np.inf:
+                    top += 1
+                    stack[top] = 4 * node + 3 - near_child
+                if min(left, right) <= best and min(left, right) < np.inf:
+                    top += 1
+                    stack[top] = near_child
+                continue
+            for t in range(starts[node - leaves + 1], starts[node - leaves + 2]):
+                az = triangles[t, kz] - origins[i, kz]
+                bz = triangles[t, 3 + kz] - origins[i, kz]
+                cz = triangles[t, 6 + kz] - origins[i, kz]
+                ax = triangles[t, kx] - origins[i, kx] - sx * az
+                ay = triangles[t, ky] - origins[i, ky] - sy * az
+                bx = triangles[t, 3 + kx] - origins[i, kx] - sx * bz
+                by = triangles[t, 3 + ky] - origins[i, ky] - sy * bz
+                cx = triangles[t, 6 + kx] - origins[i, kx] - sx * cz
+                cy = triangles[t, 6 + ky] - origins[i, ky] - sy * cz
+                u = cx * by - cy * bx
+                v = ax * cy - ay * cx
+                w = bx * ay - by * ax
+                if (u < 0.0 or v < 0.0 or w < 0.0) and (u > 0.0 or v > 0.0 or w > 0.0):
+                    continue
+                total = u + v + w
+                if total == 0.0:
+                    continue
+                distance = sz * (u * az + v * bz + w * cz) / total
+                if distance < 0.0 or distance > best:
+                    continue
+                if distance == best and found >= 0 and order[t] > order[found]:
+                    continue
+                best = distance
+                found = t
+                barycentric[i, 0] = u / total
+                barycentric[i, 1] = v / total
+                barycentric[i, 2] = w / total
+        if found >= 0:
+            faces[i] = order[found]
+            distances[i] = best
+
+
+@kernel
+def _box_distance(low, high, node, x, y, z):  # type: ignore[no-untyped-def]
     """Squared distance of a point to a node's box."""
-    total = 0.0
-    for axis in range(3):
-        gap = max(low[node, axis] - p[axis], p[axis] - high[node, axis], 0.0)
-        total += gap * gap
-    return total
+    dx = max(low[node, 0] - x, x - high[node, 0], 0.0)
+    dy = max(low[node, 1] - y, y - high[node, 1], 0.0)
+    dz = max(low[node, 2] - z, z - high[node, 2], 0.0)
+    return dx * dx + dy * dy + dz * dz
 
 
 @kernel
-def _closest_on_triangle(t: FloatArray, p: FloatArray, out: FloatArray) -> float:
-    """Barycentric coordinates of the closest point of a triangle (9,) to p into out; its squared distance."""
-    abx, aby, abz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
-    acx, acy, acz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
-    apx, apy, apz = p[0] - t[0], p[1] - t[1], p[2] - t[2]
-    bpx, bpy, bpz = p[0] - t[3], p[1] - t[4], p[2] - t[5]
-    cpx, cpy, cpz = p[0] - t[6], p[1] - t[7], p[2] - t[8]
+def _closest_on_triangle(triangles, t, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Barycentric coordinates of the closest point of triangle t to (x, y, z) into out; its squared distance."""
+    abx, aby, abz = (
+        triangles[t, 3] - triangles[t, 0],
+        triangles[t, 4] - triangles[t, 1],
+        triangles[t, 5] - triangles[t, 2],
+    )
+    acx, acy, acz = (
+        triangles[t, 6] - triangles[t, 0],
+        triangles[t, 7] - triangles[t, 1],
+        triangles[t, 8] - triangles[t, 2],
+    )
+    apx, apy, apz = x - triangles[t, 0], y - triangles[t, 1], z - triangles[t, 2]
+    bpx, bpy, bpz = x - triangles[t, 3], y - triangles[t, 4], z - triangles[t, 5]
+    cpx, cpy, cpz = x - triangles[t, 6], y - triangles[t, 7], z - triangles[t, 8]
     d1 = abx * apx + aby * apy + abz * apz
     d2 = acx * apx + acy * apy + acz * apz
     d3 = abx * bpx + aby * bpy + abz * bpz
@@ -263,32 +313,38 @@ def _closest_on_triangle(t: FloatArray, p: FloatArray, out: FloatArray) -> float
 
 
 @kernel
-def closest(
-    tree: Tree, normals: FloatArray, points: FloatArray, facing: FloatArray, facing_limit: float, limit: float
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Closest points of k queries: faces (-1: none), barycentric (k, 3), distance. facing: (k, 3) or (0, 3)."""
-    order, triangles, low, high, starts = tree
+def _closest(  # type: ignore[no-untyped-def]
+    order,
+    triangles,
+    low,
+    high,
+    starts,
+    normals,
+    points,
+    facing,
+    facing_limit,
+    limit,
+    out,
+    stack,
+    faces,
+    barycentric,
+    distance,
+):
+    """Closest points of queries into faces, barycentric, distance."""
     leaves = len(starts) - 1
-    k = len(points)
-    faces = np.full(k, -1, np.int64)
-    barycentric = np.zeros((k, 3))
-    barycentric[:, 0] = 1.0
-    distance = np.full(k, np.inf)
-    stack = np.empty(STACK, np.int64)
-    out = np.empty(3)
-    for i in range(k):
-        p = points[i]
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
         best = limit * limit
         top = 0
         stack[0] = 0
         while top >= 0:
             node = stack[top]
             top -= 1
-            if _box_distance(low, high, node, p) > best:
+            if _box_distance(low, high, node, x, y, z) > best:
                 continue
             if node < leaves - 1:
-                left = _box_distance(low, high, 2 * node + 1, p)
-                right = _box_distance(low, high, 2 * node + 2, p)
+                left = _box_distance(low, high, 2 * node + 1, x, y, z)
+                right = _box_distance(low, high, 2 * node + 2, x, y, z)
                 near_child = 2 * node + 1 if left <= right else 2 * node + 2
                 if max(left, right) <= best:
                     top += 1
@@ -299,27 +355,29 @@ def closest(
                 continue
             for t in range(starts[node - leaves + 1], starts[node - leaves + 2]):
                 f = order[t]
-                if len(facing) and (
-                    normals[f, 0] * facing[i, 0] + normals[f, 1] * facing[i, 1] + normals[f, 2] * facing[i, 2]
-                    > facing_limit
-                ):
-                    continue
-                squared = _closest_on_triangle(triangles[t], p, out)
+                if len(facing):
+                    cosine = (
+                        normals[f, 0] * facing[i, 0] + normals[f, 1] * facing[i, 1] + normals[f, 2] * facing[i, 2]
+                    )
+                    if cosine > facing_limit:
+                        continue
+                squared = _closest_on_triangle(triangles, t, x, y, z, out)
                 if squared > best or (squared == best and faces[i] >= 0 and f > faces[i]):
                     continue
                 best = squared
                 faces[i] = f
-                barycentric[i] = out
+                barycentric[i, 0] = out[0]
+                barycentric[i, 1] = out[1]
+                barycentric[i, 2] = out[2]
                 distance[i] = np.sqrt(squared)
-    return faces, barycentric, distance
 
 
 @kernel
-def _solid_angle(t: FloatArray, p: FloatArray) -> float:
-    """Signed solid angle of a triangle (9,) seen from p (van Oosterom and Strackee 1983)."""
-    ax, ay, az = t[0] - p[0], t[1] - p[1], t[2] - p[2]
-    bx, by, bz = t[3] - p[0], t[4] - p[1], t[5] - p[2]
-    cx, cy, cz = t[6] - p[0], t[7] - p[1], t[8] - p[2]
+def _solid_angle(triangles, t, x, y, z):  # type: ignore[no-untyped-def]
+    """Signed solid angle of triangle t seen from (x, y, z) (van Oosterom and Strackee 1983)."""
+    ax, ay, az = triangles[t, 0] - x, triangles[t, 1] - y, triangles[t, 2] - z
+    bx, by, bz = triangles[t, 3] - x, triangles[t, 4] - y, triangles[t, 5] - z
+    cx, cy, cz = triangles[t, 6] - x, triangles[t, 7] - y, triangles[t, 8] - z
     a = np.sqrt(ax * ax + ay * ay + az * az)
     b = np.sqrt(bx * bx + by * by + bz * bz)
     c = np.sqrt(cx * cx + cy * cy + cz * cz)
@@ -331,22 +389,18 @@ def _solid_angle(t: FloatArray, p: FloatArray) -> float:
 
 
 @kernel
-def winding(tree: Tree, nodes: Dipoles, points: FloatArray, accuracy: float) -> FloatArray:
-    """(k,) generalised winding numbers of points (k, 3)."""
-    triangles, starts = tree[1], tree[4]
-    area, centre, radius = nodes
+def _winding(triangles, starts, area, centre, radius, points, accuracy, stack, result):  # type: ignore[no-untyped-def]
+    """Generalised winding numbers of points into result."""
     leaves = len(starts) - 1
-    result = np.zeros(len(points))
-    stack = np.empty(STACK, np.int64)
     for i in range(len(points)):
-        p = points[i]
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
         total = 0.0
         top = 0
         stack[0] = 0
         while top >= 0:
             node = stack[top]
             top -= 1
-            dx, dy, dz = centre[node, 0] - p[0], centre[node, 1] - p[1], centre[node, 2] - p[2]
+            dx, dy, dz = centre[node, 0] - x, centre[node, 1] - y, centre[node, 2] - z
             squared = dx * dx + dy * dy + dz * dz
             reach = accuracy * radius[node]
             if squared > reach * reach:
@@ -359,6 +413,5 @@ def winding(tree: Tree, nodes: Dipoles, points: FloatArray, accuracy: float) -> 
                 top += 2
             else:
                 for t in range(starts[node - leaves + 1], starts[node - leaves + 2]):
-                    total += _solid_angle(triangles[t], p)
+                    total += _solid_angle(triangles, t, x, y, z)
         result[i] = total / (4.0 * np.pi)
-    return result

@@ -1,9 +1,8 @@
 """Locator: rays to surface points and closest surface points, batched, over one small tree of boxes.
 
-The tree is implicit: faces are sorted along a space-filling curve (Morton order of their centres) and cut
-into 2^k equal runs, the leaves; node i has the children 2i + 1 and 2i + 2. So it is built by sorting and
-reductions alone, has no pointers, and serves rays, closest points and winding numbers. ADR 0015 compares it
-with Embree and others.
+The tree is implicit: faces are sorted by medians, each time along the longest axis, and cut into 2^k equal
+runs, the leaves; node i has the children 2i + 1 and 2i + 2. So it is built by selection and reductions, has no
+pointers, and serves rays, closest points and winding numbers. docs/adr/0080 compares it with Embree.
 
 Rays use the watertight test of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection", JCGT 2013): no
 ray slips between two faces. Closest points follow Ericson, "Real-Time Collision Detection", 5.1.5.
