@@ -1,0 +1,62 @@
+"""What a brush is: it turns a gesture into points on a surface, chosen by a plugin (hook `contact_brushes`).
+
+A brush never sees a window. What it needs of one arrives as data: the points that the pointer passed over, or
+screen positions with a callable that turns them into rays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+from contact_core.arrays import FloatArray, frozen
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+
+ScreenToRays = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # (k, 2) -> origins (k, 3), directions (k, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class BrushGesture:
+    """One gesture over one mesh.
+
+    path: the k surface points that the pointer passed over, in order. screen: (c, 2) control points in the
+    host's screen units, and rays: the callable that turns screen positions into rays in surface space, for
+    brushes that draw in screen space. radius, spacing: surface units; 0 leaves the choice to the brush.
+    options: the brush's own settings. seed: for brushes that sample; equal gestures give equal points.
+    """
+
+    mesh: TriangleMesh
+    path: SurfacePoints
+    radius: float = 0.0
+    spacing: float = 0.0
+    screen: FloatArray | None = None
+    rays: ScreenToRays | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class BrushMark:
+    """What a brush leaves. points: n surface points. strength: (n,) 0..1, 1 where a brush has no falloff."""
+
+    points: SurfacePoints
+    strength: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "strength", frozen(self.strength, float, (len(self.points),), "strength"))
+        if len(self.strength) and not (self.strength.min() >= 0.0 and self.strength.max() <= 1.0):
+            raise InvalidInput(f"the strength of a brush lies in 0..1, but {float(self.strength.max())} came.")
+
+
+@runtime_checkable
+class Brush(Protocol):
+    """Turns a gesture into a mark. `erases`: the mark removes what lies under it instead of adding."""
+
+    name: str
+    summary: str
+    erases: bool
+
+    def mark(self, gesture: BrushGesture) -> BrushMark: ...

@@ -1,0 +1,245 @@
+"""Values to JSON and back, driven by the annotations of frozen dataclasses.
+
+One codec for documents, commands and contact sets, so that a value which can be built can be stored. Arrays
+become lists, complex numbers [real, imaginary]; classes that come in unions (`json_union`) carry a key "is".
+No NaN, no infinity, no code: what does not fit its annotation is refused in words with the place in the file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from contact_core.document.frozen_map import FrozenMap
+from contact_core.errors import ContactError, FileRefused
+
+MAX_ARRAY = 50_000_000  # numbers in one array: beyond any patch, below any memory bomb
+ROW = 12  # numbers on a line of the written file
+
+
+def to_json(value: Any, annotation: Any = Any) -> Any:
+    """JSON-able data of a value; `annotation` settles what 1 means (1.0 where a float belongs)."""
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if annotation is float or annotation is int:
+        return annotation(value)
+    if annotation is complex or isinstance(value, complex):
+        number = complex(value)
+        return [number.real, number.imag]
+    if isinstance(value, (int, float)):
+        return value
+    if isinstance(value, np.ndarray):
+        return _array_to_json(value)
+    if isinstance(value, Mapping):
+        item_type = get_args(annotation)[0] if get_origin(annotation) is FrozenMap else Any
+        return {name: to_json(item, item_type) for name, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        types_of_items = _item_types(annotation, len(value))
+        return [to_json(item, item_type) for item, item_type in zip(value, types_of_items, strict=True)]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        tag = {"is": type(value).__name__} if getattr(value, "json_union", False) else {}
+        hints = _hints(type(value))
+        return tag | {name: to_json(getattr(value, name), hints[name]) for name in _fields(type(value))}
+    raise TypeError(f"{type(value).__name__} has no JSON form.")
+
+
+def from_json(annotation: Any, data: Any, where: str = "value") -> Any:
+    """The value of `annotation` that `data` stands for. Raises FileRefused naming the place that does not fit."""
+    try:
+        return _decode(annotation, data, where)
+    except FileRefused:
+        raise
+    except (ContactError, ValueError, TypeError, OverflowError) as error:
+        raise FileRefused(f"{where} does not fit: {error}") from error
+
+
+def freeze_json(data: Any) -> Any:
+    """JSON data as an immutable value: objects become FrozenMap, lists tuples. Raises FileRefused."""
+    if data is None or isinstance(data, (bool, int, str)):
+        return data
+    if isinstance(data, float):
+        return _finite(data, "JSON data")
+    if isinstance(data, Mapping):
+        return FrozenMap({_text(key, "a key"): freeze_json(item) for key, item in data.items()})
+    if isinstance(data, (list, tuple)):
+        return tuple(freeze_json(item) for item in data)
+    raise FileRefused(f"JSON data holds numbers, texts, lists and objects, but {type(data).__name__} came.")
+
+
+def pretty(data: Any, indent: int = 0) -> str:
+    """Deterministic JSON text for review: sorted keys, one item a line, numbers in rows."""
+    pad = " " * (indent + 1)
+    if isinstance(data, dict) and data:
+        lines = [f"{pad}{json.dumps(key)}: {pretty(data[key], indent + 1)}" for key in sorted(data)]
+        return "{\n" + ",\n".join(lines) + "\n" + " " * indent + "}"
+    if isinstance(data, list) and data and isinstance(data[0], (list, dict)):
+        if all(isinstance(item, list) and len(item) <= 4 for item in data):
+            return _rows(data, pad, indent)
+        return "[\n" + ",\n".join(pad + pretty(item, indent + 1) for item in data) + "\n" + " " * indent + "]"
+    if isinstance(data, list) and len(data) > ROW:
+        return _rows(data, pad, indent)
+    return json.dumps(data, allow_nan=False)
+
+
+def _rows(data: list[Any], pad: str, indent: int) -> str:
+    rows = (json.dumps(data[k : k + ROW], allow_nan=False)[1:-1] for k in range(0, len(data), ROW))
+    return "[\n" + ",\n".join(pad + row for row in rows) + "\n" + " " * indent + "]"
+
+
+def _array_to_json(array: np.ndarray[Any, Any]) -> Any:
+    if np.iscomplexobj(array):
+        return np.stack([array.real, array.imag], -1).tolist()
+    return array.tolist()
+
+
+def _item_types(annotation: Any, count: int) -> Sequence[Any]:
+    """The annotation of each of `count` items of a tuple."""
+    items = get_args(annotation) if get_origin(annotation) is tuple else ()
+    if len(items) == 2 and items[1] is Ellipsis:
+        return [items[0]] * count
+    return items if len(items) == count else [Any] * count
+
+
+@cache
+def _hints(cls: type) -> dict[str, Any]:
+    return get_type_hints(cls)
+
+
+@cache
+def _fields(cls: type) -> tuple[str, ...]:
+    return tuple(item.name for item in dataclasses.fields(cls))
+
+
+def _members(annotation: Any) -> list[Any]:
+    """The dataclasses of a union."""
+    if get_origin(annotation) not in (Union, types.UnionType):
+        return []
+    return [member for member in get_args(annotation) if dataclasses.is_dataclass(member)]
+
+
+def _decode(annotation: Any, data: Any, where: str) -> Any:
+    origin = get_origin(annotation)
+    if origin in (Union, types.UnionType):
+        return _decode_union(annotation, data, where)
+    if origin is Literal:
+        if data not in get_args(annotation):
+            raise FileRefused(f"{where} is one of {get_args(annotation)}, but {data!r} came.")
+        return data
+    if origin is FrozenMap:
+        (item_type,) = get_args(annotation)
+        items = _object(data, where)
+        return FrozenMap({key: _decode(item_type, item, f"{where}.{key}") for key, item in items.items()})
+    if origin is tuple:
+        return _decode_tuple(get_args(annotation), data, where)
+    if origin is np.ndarray:
+        return _decode_array(annotation, data, where)
+    if annotation is Any:
+        return freeze_json(data)
+    if dataclasses.is_dataclass(annotation) and isinstance(annotation, type):
+        return _decode_dataclass(annotation, data, where)
+    return _decode_scalar(annotation, data, where)
+
+
+def _decode_scalar(annotation: Any, data: Any, where: str) -> Any:
+    if annotation is bool and isinstance(data, bool):
+        return data
+    if annotation is str:
+        return _text(data, where)
+    if annotation is int and isinstance(data, int) and not isinstance(data, bool):
+        return data
+    if annotation is float and isinstance(data, (int, float)) and not isinstance(data, bool):
+        return _finite(float(data), where)
+    if annotation is complex and isinstance(data, list) and len(data) == 2:
+        return complex(_finite(float(data[0]), where), _finite(float(data[1]), where))
+    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but {str(data)[:60]!r} came.")
+
+
+def _decode_union(annotation: Any, data: Any, where: str) -> Any:
+    if data is None and type(None) in get_args(annotation):
+        return None
+    members = _members(annotation)
+    if len(members) > 1:
+        kind = _object(data, where).get("is")
+        for member in members:
+            if member.__name__ == kind:
+                return _decode_dataclass(member, data, where)
+        names = ", ".join(member.__name__ for member in members)
+        raise FileRefused(f'{where} needs a key "is" that is one of {names}, but {kind!r} came.')
+    (only,) = [member for member in get_args(annotation) if member is not type(None)]
+    return _decode(only, data, where)
+
+
+def _decode_tuple(item_types: tuple[Any, ...], data: Any, where: str) -> tuple[Any, ...]:
+    if not isinstance(data, (list, tuple)) or len(data) > MAX_ARRAY:
+        raise FileRefused(f"{where} wants a list, but {str(data)[:60]!r} came.")
+    if len(item_types) == 2 and item_types[1] is Ellipsis:
+        return tuple(_decode(item_types[0], item, f"{where}[{k}]") for k, item in enumerate(data))
+    if len(item_types) != len(data):
+        raise FileRefused(f"{where} wants {len(item_types)} items, but {len(data)} came.")
+    pairs = zip(item_types, data, strict=True)
+    return tuple(_decode(item_type, item, f"{where}[{k}]") for k, (item_type, item) in enumerate(pairs))
+
+
+def _decode_array(annotation: Any, data: Any, where: str) -> np.ndarray[Any, Any]:
+    if not isinstance(data, list) or len(data) > MAX_ARRAY:
+        raise FileRefused(f"{where} wants a list of numbers, but {str(data)[:60]!r} came.")
+    dtype = np.dtype(get_args(get_args(annotation)[1])[0])
+    complex_wanted = dtype.kind == "c"
+    raw = np.array(data, dtype=np.float64 if complex_wanted else None)
+    if raw.dtype.kind not in "biuf" or (raw.dtype.kind == "f" and not np.isfinite(raw).all()):
+        raise FileRefused(f"{where} wants finite numbers.")
+    if dtype.kind in "iu" and raw.size and raw.dtype.kind not in "iu":
+        raise FileRefused(f"{where} wants whole numbers.")
+    if complex_wanted:
+        if raw.size and (raw.ndim < 2 or raw.shape[-1] != 2):
+            raise FileRefused(f"{where} wants pairs of numbers.")
+        raw = np.ascontiguousarray(raw).view(np.complex128)[..., 0] if raw.size else raw
+    array = np.ascontiguousarray(raw.astype(dtype))
+    array.setflags(write=False)
+    return array
+
+
+def _decode_dataclass(cls: type, data: Any, where: str) -> Any:
+    items = dict(_object(data, where))
+    if getattr(cls, "json_union", False) and items.pop("is", cls.__name__) != cls.__name__:
+        raise FileRefused(f"{where} wants a {cls.__name__}.")
+    fields = {item.name: item for item in dataclasses.fields(cls)}
+    unknown = sorted(set(items) - set(fields))
+    if unknown:
+        raise FileRefused(f"{where} has no field {unknown[0]!r}; it has {', '.join(fields)}.")
+    hints, values = _hints(cls), {}
+    for name, item in fields.items():
+        if name in items:
+            values[name] = _decode(hints[name], items[name], f"{where}.{name}")
+        elif item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING:
+            raise FileRefused(f"{where} lacks the field {name!r}.")
+    try:
+        return cls(**values)
+    except ContactError as error:
+        raise FileRefused(f"{where} does not fit: {error}") from error
+
+
+def _object(data: Any, where: str) -> Mapping[str, Any]:
+    if not isinstance(data, Mapping):
+        raise FileRefused(f"{where} wants an object, but {str(data)[:60]!r} came.")
+    return typing.cast("Mapping[str, Any]", data)
+
+
+def _text(data: Any, where: str) -> str:
+    if not isinstance(data, str):
+        raise FileRefused(f"{where} wants a text, but {str(data)[:60]!r} came.")
+    return data
+
+
+def _finite(number: float, where: str) -> float:
+    if not math.isfinite(number):
+        raise FileRefused(f"{where} wants a finite number, but {number} came.")
+    return number

@@ -1,0 +1,205 @@
+"""The document: an immutable value that says which surfaces there are and what contact lies on them.
+
+It holds no mesh and no reconstructed point. Surfaces are remembered by name and content digest; points follow
+from shape and placement (see ADR 0020). Everything is plain data: equal documents have equal bytes on disk.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, frozen
+from contact_core.contact.placement import Link, Placement
+from contact_core.contact.shape import AxisShape, PatchShape
+from contact_core.document.frozen_map import FrozenMap
+from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.pose.rig import Pose
+
+Color = tuple[float, float, float]
+MAX_NAME = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A surface as the document remembers it: enough to recognise it, not to draw it.
+
+    digest, topology_digest: of its TriangleMesh. world_from_surface: (4, 4) rigid; where the object, or the rig's
+    own space, stands in the scene. rig: name of the rig whose rest pose this is, None for an object.
+    """
+
+    name: str
+    digest: str
+    topology_digest: str
+    points: int
+    faces: int
+    meters_per_unit: float = 1.0
+    up_axis: Literal["X", "Y", "Z"] = "Y"
+    rig: str | None = None
+    world_from_surface: FloatArray = field(default_factory=lambda: np.eye(4))
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "a surface")
+        matrix = frozen(self.world_from_surface, np.float64, (4, 4), "world_from_surface")
+        object.__setattr__(self, "world_from_surface", matrix)
+        turn = matrix[:3, :3]
+        if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-6 or np.linalg.det(turn) < 0.0:
+            raise InvalidInput(
+                f"world_from_surface of {self.name!r} must be rigid: apply scale and shear to the points instead."
+            )
+        if not 0.0 < self.meters_per_unit < np.inf:
+            raise InvalidInput(f"meters_per_unit is a positive number, but {self.meters_per_unit} came.")
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """One contact patch: a shape, placed on a surface.
+
+    shape: key into the document's shapes; a transferred patch shares the key of its source. original: it was
+    painted here, so its edits of the shape reach all partners; a transferred patch keeps its own deviation
+    instead: turns (axis point, radians added to the turning angle there), along and spread (factors).
+    mirrored: reconstructed as the mirror image of the shape.
+    """
+
+    name: str
+    surface: str
+    shape: str
+    placement: Placement
+    original: bool = True
+    mirrored: bool = False
+    color: Color = (0.9, 0.4, 0.3)
+    turns: tuple[tuple[int, float], ...] = ()
+    along: float = 1.0
+    spread: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "a patch")
+        if len(self.color) != 3 or not all(0.0 <= c <= 1.0 for c in self.color):
+            raise InvalidInput(f"a colour is three numbers in 0..1, but {self.color} came.")
+        if not (0.0 < self.along < np.inf and 0.0 < self.spread < np.inf):
+            raise InvalidInput(f"along and spread are positive factors, but {self.along} and {self.spread} came.")
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPair:
+    """Two patches that are to touch, and how much this pair counts."""
+
+    name: str
+    manipulator: str
+    object: str
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "a pair")
+        if self.manipulator == self.object:
+            raise InvalidInput(f"a pair joins two patches, but {self.object!r} came twice.")
+        if not 0.0 <= self.weight < np.inf:
+            raise InvalidInput(f"the weight of a pair is not negative, but {self.weight} came.")
+
+
+@dataclass(frozen=True, eq=False)
+class ContactDocument:
+    """The whole document; every part a read-only mapping by name.
+
+    shapes: by key. groups: names of patches that belong together across surfaces. poses: by surface, the pose its
+    rig is in. extras: JSON values of hosts and plugins by namespace ("host.blender").
+    """
+
+    surfaces: FrozenMap[Surface] = field(default_factory=FrozenMap)
+    patches: FrozenMap[Patch] = field(default_factory=FrozenMap)
+    shapes: FrozenMap[PatchShape] = field(default_factory=FrozenMap)
+    pairs: FrozenMap[ContactPair] = field(default_factory=FrozenMap)
+    groups: FrozenMap[tuple[str, ...]] = field(default_factory=FrozenMap)
+    poses: FrozenMap[Pose] = field(default_factory=FrozenMap)
+    extras: FrozenMap[Any] = field(default_factory=FrozenMap)
+
+    def patch(self, name: str) -> Patch:
+        """The patch. Raises CommandRejected naming those that exist."""
+        return named(self.patches, name, "patch")
+
+    def surface(self, name: str) -> Surface:
+        """The surface. Raises CommandRejected naming those that exist."""
+        return named(self.surfaces, name, "surface")
+
+    def shape_of(self, name: str) -> PatchShape:
+        """The shape that a patch shares with its partners, before its own deviation."""
+        return self.shapes[self.patch(name).shape]
+
+    def effective_axis(self, name: str) -> AxisShape:
+        """The axis shape of a patch with its own deviation, as drawn (not mirrored)."""
+        patch = self.patch(name)
+        axis = self.shapes[patch.shape].axis
+        if not patch.turns and patch.along == 1.0 and patch.spread == 1.0:
+            return axis
+        angles = axis.turning_angles.copy()
+        for point, angle in patch.turns:
+            if 1 <= point <= len(angles):  # a new, shorter axis of the source may have dropped the point
+                angles[point - 1] += angle
+        return AxisShape(axis.lengths, angles, axis.along * patch.along, axis.spread * patch.spread)
+
+    def partners(self, name: str) -> tuple[str, ...]:
+        """All other patches that share the shape of a patch."""
+        key = self.patch(name).shape
+        return tuple(other.name for other in self.patches.values() if other.shape == key and other.name != name)
+
+    def children(self, name: str) -> tuple[str, ...]:
+        """The patches that hang on a patch directly."""
+        return tuple(
+            other.name
+            for other in self.patches.values()
+            if isinstance(other.placement, Link) and other.placement.parent == name
+        )
+
+    def descendants(self, name: str) -> Iterator[str]:
+        """All patches below a patch, parents before children."""
+        waiting = list(self.children(name))
+        while waiting:
+            child = waiting.pop(0)
+            yield child
+            waiting.extend(self.children(child))
+
+    def ancestors(self, name: str) -> Iterator[str]:
+        """The parent of a patch, its parent, and so on."""
+        placement = self.patch(name).placement
+        while isinstance(placement, Link):
+            yield placement.parent
+            placement = self.patch(placement.parent).placement
+
+    def with_patches(self, *patches: Patch) -> ContactDocument:
+        """A copy with patches put in or replaced."""
+        return replace(self, patches=self.patches.updated({patch.name: patch for patch in patches}))
+
+    def with_shape(self, key: str, shape: PatchShape) -> ContactDocument:
+        """A copy with a shape put in or replaced."""
+        return replace(self, shapes=self.shapes.with_item(key, shape))
+
+    def free_name(self, wanted: str, among: Mapping[str, Any] | None = None) -> str:
+        """`wanted`, or the first of wanted.2, wanted.3 ... that no patch (or nothing of `among`) has."""
+        taken = self.patches if among is None else among
+        name, number = wanted, 2
+        while name in taken:
+            name, number = f"{wanted}.{number}", number + 1
+        return name
+
+
+T = TypeVar("T")
+
+
+def named(items: Mapping[str, T], name: str, kind: str) -> T:
+    """The item called `name`. Raises CommandRejected with near names where there is none."""
+    try:
+        return items[name]
+    except KeyError:
+        near = difflib.get_close_matches(name, items, n=3) or sorted(items)[:5]
+        there = f"near names: {', '.join(near)}" if near else f"the document has no {kind} at all"
+        raise CommandRejected(f"there is no {kind} {name!r}; {there}.") from None
+
+
+def check_name(name: str, kind: str) -> None:
+    """Raises InvalidInput unless `name` can be a name: printable, trimmed, not empty and of bounded length."""
+    if not (isinstance(name, str) and 0 < len(name) <= MAX_NAME and name.isprintable() and name == name.strip()):
+        raise InvalidInput(f"the name of {kind} is 1..{MAX_NAME} printable characters, trimmed; got {name!r}.")

@@ -1,0 +1,86 @@
+"""One writer for one document: a lock file that the operating system releases when its holder dies."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import os
+import socket
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from contact_core.errors import FileRefused
+
+
+class DocumentLock:
+    """The right to write a document and its journal. Answered by `take`; let go of by `release`."""
+
+    def __init__(self, path: Path, file: int) -> None:
+        self.path = path
+        self._file = file
+
+    @classmethod
+    def take(cls, document_path: Path) -> DocumentLock | str:
+        """The lock, or a sentence on who holds it. Raises FileRefused where no lock file can be made."""
+        path = document_path.with_name(document_path.name + ".lock")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise FileRefused(f"cannot make the lock file {path}: {error.strerror or error}.") from error
+        if not _try_lock(file):
+            os.close(file)
+            return f"{document_path.name} is open in {_holder(path)}; it is opened read-only here."
+        os.ftruncate(file, 0)
+        os.lseek(file, 0, os.SEEK_SET)
+        os.write(file, json.dumps(_myself()).encode())
+        return cls(path, file)
+
+    def release(self) -> None:
+        """Let go; the file stays, empty of a holder."""
+        if self._file >= 0:
+            os.ftruncate(self._file, 0)
+            os.close(self._file)  # closing releases the lock
+            self._file = -1
+
+
+def _myself() -> dict[str, Any]:
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):  # a container without a user entry
+        user = "unknown"
+    started = time.strftime("%Y-%m-%d %H:%M:%S")
+    return {"process": os.getpid(), "host": socket.gethostname(), "user": user, "since": started}
+
+
+def _holder(path: Path) -> str:
+    try:
+        who = json.loads(path.read_bytes()[:4096])
+        return f"process {who['process']} of {who['user']} on {who['host']} since {who['since']}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return "another process"
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _try_lock(file: int) -> bool:
+        """Lock a byte far behind the text, so that others can read who holds it."""
+        os.lseek(file, 1 << 20, os.SEEK_SET)
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+
+else:
+    import fcntl
+
+    def _try_lock(file: int) -> bool:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True

@@ -1,0 +1,149 @@
+"""The document as JSON: a schema name and a version, the same bytes for the same document, upgrades, checks."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from contact_core.contact.placement import Link
+from contact_core.contact.shape import PatchShape
+from contact_core.document.codec import from_json, pretty, to_json
+from contact_core.document.document import ContactDocument, Patch
+from contact_core.errors import FileRefused
+
+SCHEMA = "contact-core.document"
+VERSION = 1
+MAX_BYTES = 1 << 30
+
+# From each released version to the next: data of version k -> data of version k + 1. Nothing else reads old files.
+UPGRADES: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+
+
+def document_to_json(document: ContactDocument) -> dict[str, Any]:
+    """JSON-able data with schema name and version."""
+    return {"schema": SCHEMA, "version": VERSION, **to_json(document)}
+
+
+def document_from_json(data: Any, source: str = "the document") -> ContactDocument:
+    """The document that data stands for, upgraded where it is older. Raises FileRefused in a sentence."""
+    body = open_envelope(data, SCHEMA, VERSION, UPGRADES, source)
+    document: ContactDocument = from_json(ContactDocument, body, source)
+    for problem in inconsistencies(document):
+        raise FileRefused(f"{source} contradicts itself: {problem}")
+    return document
+
+
+def dump_document(document: ContactDocument) -> bytes:
+    """UTF-8 JSON, made for review: sorted, one item a line. Equal documents give equal bytes."""
+    return (pretty(document_to_json(document)) + "\n").encode()
+
+
+def parse_document(text: bytes, source: str = "the document") -> ContactDocument:
+    """The document in UTF-8 JSON. Raises FileRefused."""
+    return document_from_json(parse_json(text, source), source)
+
+
+def same_documents(a: ContactDocument, b: ContactDocument) -> bool:
+    """Whether two documents say the same (arrays compare by value)."""
+    return a is b or document_to_json(a) == document_to_json(b)
+
+
+def parse_json(text: bytes, source: str) -> Any:
+    """JSON of bounded size, without NaN. Raises FileRefused naming the line."""
+    if len(text) > MAX_BYTES:
+        raise FileRefused(f"{source} has {len(text)} bytes; more than {MAX_BYTES} are refused.")
+    try:
+        return json.loads(text.decode("utf-8"), parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:  # JSONDecodeError and UnicodeDecodeError are ValueErrors
+        raise FileRefused(f"{source} is not valid JSON: {error}.") from error
+
+
+def open_envelope(
+    data: Any,
+    schema: str,
+    version: int,
+    upgrades: dict[int, Callable[[dict[str, Any]], dict[str, Any]]],
+    source: str,
+) -> dict[str, Any]:
+    """The fields of schema-and-version data without those two, brought up to `version`. Raises FileRefused."""
+    if not isinstance(data, dict) or data.get("schema") != schema:
+        found = data.get("schema") if isinstance(data, dict) else type(data).__name__
+        raise FileRefused(f"{source} is not a {schema} file (its schema is {found!r}).")
+    came = data.get("version")
+    if not isinstance(came, int) or isinstance(came, bool) or came < 1:
+        raise FileRefused(f"{source} names no version that exists ({came!r}).")
+    if came > version:
+        raise FileRefused(
+            f"{source} was written as {schema} version {came}, but this release reads up to version {version}:"
+            f" install a newer contact-core. The file is left untouched."
+        )
+    body = {key: item for key, item in data.items() if key not in ("schema", "version")}
+    for step in range(came, version):
+        body = upgrades[step](body)
+    return body
+
+
+def inconsistencies(document: ContactDocument) -> Iterator[str]:
+    """Sentences on what contradicts itself in a document; none for every document that commands can make."""
+    for kind, items in (("surface", document.surfaces), ("patch", document.patches), ("pair", document.pairs)):
+        for key, item in items.items():
+            if item.name != key:
+                yield f"{kind} {item.name!r} is filed under {key!r}."
+    for patch in document.patches.values():
+        yield from _patch_inconsistencies(document, patch)
+    used = {patch.shape for patch in document.patches.values()}
+    yield from (f"shape {key!r} belongs to no patch." for key in document.shapes if key not in used)
+    for pair in document.pairs.values():
+        for end in (pair.manipulator, pair.object):
+            if end not in document.patches:
+                yield f"pair {pair.name!r} names the patch {end!r}, which does not exist."
+    for name, members in document.groups.items():
+        for member in members:
+            if member not in document.patches:
+                yield f"group {name!r} names the patch {member!r}, which does not exist."
+    yield from (f"a pose names the surface {name!r}, which does not exist."
+                for name in document.poses if name not in document.surfaces)  # fmt: skip
+
+
+def _patch_inconsistencies(document: ContactDocument, patch: Patch) -> Iterator[str]:
+    surface = document.surfaces.get(patch.surface)
+    shape = document.shapes.get(patch.shape)
+    if surface is None:
+        yield f"patch {patch.name!r} lies on the surface {patch.surface!r}, which does not exist."
+    if shape is None:
+        yield f"patch {patch.name!r} has the shape {patch.shape!r}, which does not exist."
+    place = patch.placement
+    if not isinstance(place, Link):
+        if surface is not None and place.face >= surface.faces:
+            yield f"patch {patch.name!r} is rooted in face {place.face} of {surface.faces}."
+        return
+    parent = document.patches.get(place.parent)
+    if parent is None:
+        yield f"patch {patch.name!r} hangs on {place.parent!r}, which does not exist."
+        return
+    if parent.surface != patch.surface:
+        yield f"patch {patch.name!r} hangs on {place.parent!r}, which lies on another surface."
+    yield from _link_inconsistencies(document, patch, place, parent, shape)
+
+
+def _link_inconsistencies(
+    document: ContactDocument, patch: Patch, link: Link, parent: Patch, shape: PatchShape | None
+) -> Iterator[str]:
+    parent_shape = document.shapes.get(parent.shape)
+    if parent_shape is not None and link.parent_point >= parent_shape.axis.point_count:
+        yield f"patch {patch.name!r} hangs on point {link.parent_point} of {parent.name!r}, past its axis."
+    if shape is not None and link.own_point >= shape.axis.point_count:
+        yield f"patch {patch.name!r} hangs by its point {link.own_point}, past its axis."
+    seen, above = {patch.name}, parent
+    while isinstance(above.placement, Link) and above.name not in seen:
+        seen.add(above.name)
+        if above.placement.parent not in document.patches:
+            return
+        above = document.patches[above.placement.parent]
+    if above.name in seen:
+        yield f"patch {patch.name!r} hangs on itself through {above.name!r}."
+
+
+def _refuse_constant(name: str) -> Any:
+    raise ValueError(f"{name} is not a number that a document may hold")

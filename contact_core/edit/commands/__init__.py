@@ -1,0 +1,58 @@
+"""Every built-in command. Importing this package registers them all."""
+
+from contact_core.edit.command import Macro
+from contact_core.edit.commands.organising import (
+    Group,
+    Import,
+    Pair,
+    Recolor,
+    Rename,
+    SetExtra,
+    Ungroup,
+    Unpair,
+)
+from contact_core.edit.commands.painting import Detach, Erase, Extend, Paint, Remove, Reshape, Weigh
+from contact_core.edit.commands.placing import Bend, LinkPatch, Mirror, Rotate, Scale, Transfer, Translate, Unlink
+from contact_core.edit.commands.surfaces import (
+    AddSurface,
+    ClearPose,
+    PlaceSurface,
+    RebindSurface,
+    RemoveSurface,
+    RenameSurface,
+    SetPose,
+)
+
+__all__ = [
+    "AddSurface",
+    "Bend",
+    "ClearPose",
+    "Detach",
+    "Erase",
+    "Extend",
+    "Group",
+    "Import",
+    "LinkPatch",
+    "Macro",
+    "Mirror",
+    "Paint",
+    "Pair",
+    "PlaceSurface",
+    "RebindSurface",
+    "Recolor",
+    "Remove",
+    "RemoveSurface",
+    "Rename",
+    "RenameSurface",
+    "Reshape",
+    "Rotate",
+    "Scale",
+    "SetExtra",
+    "SetPose",
+    "Transfer",
+    "Translate",
+    "Ungroup",
+    "Unlink",
+    "Unpair",
+    "Weigh",
+]

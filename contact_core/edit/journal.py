@@ -1,0 +1,253 @@
+"""The journal: an append-only file beside an open document, one line for each committed event.
+
+A line is a CRC-32 in eight hex digits, a blank, compact JSON, a newline. The first line holds the whole document
+that the session started from, so a journal alone replays to everything that was acknowledged. An event is
+acknowledged when the operating system has it (killing the process loses nothing); a thread flushes it to the
+disk within FLUSH_SECONDS, which is the window that a power cut can lose.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from contact_core.document.document import ContactDocument
+from contact_core.document.schema import document_from_json, document_to_json
+from contact_core.edit.command import command_from_json, command_to_json
+from contact_core.edit.history import History, Step
+from contact_core.errors import ContactError, FileRefused
+from contact_core.whole_file import write_whole
+
+SCHEMA = "contact-core.journal"
+VERSION = 1
+FLUSH_SECONDS = 0.1
+MAX_BYTES = 4 << 30
+
+
+class Journal:
+    """An open journal, for one writer. Use `start` or `resume`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
+        self._length = os.lseek(self._file, 0, os.SEEK_END)
+        self._broken: str | None = None
+        self._lock = threading.Lock()
+        self._dirty = threading.Event()
+        self._closing = threading.Event()
+        self._flusher: threading.Thread | None = None
+
+    @classmethod
+    def start(cls, path: Path, history: History, file_digest: str | None) -> Journal:
+        """A new journal from the current document of `history`, written whole and flushed. Raises FileRefused.
+
+        file_digest: of the document file as it lies on the disk, None where there is none yet.
+        """
+        header = {
+            "journal": SCHEMA,
+            "version": VERSION,
+            "revision": history.revision,
+            "file": file_digest,
+            "document": document_to_json(history.document),
+        }
+        write_whole(path, encode_line(header))
+        return cls(path)
+
+    def did(self, step: Step, *, merged: bool = False) -> None:
+        """Record a step about to be committed. `merged`: it takes the place of the step before it.
+
+        Raises FileRefused when it cannot be written; then the journal is as it was, and the step must not be.
+        """
+        event = {"at": step.revision, "do": command_to_json(step.command), "origin": step.origin}
+        self._append(event | {"merged": True} if merged else event)
+
+    def went(self, revision: int) -> None:
+        """Record an undo, a redo or a jump. Raises FileRefused."""
+        self._append({"goto": revision})
+
+    def saved(self, revision: int, file_digest: str) -> None:
+        """Record that the document file now holds `revision`. Raises FileRefused."""
+        self._append({"saved": revision, "file": file_digest})
+
+    def flush(self) -> None:
+        """To the disk, now."""
+        with self._lock:
+            if self._file >= 0:
+                os.fsync(self._file)
+
+    def close(self, *, record: bool = True) -> None:
+        """Flush and close. `record`: this is an orderly end, so the next opening does not replay the journal."""
+        if self._file < 0:
+            return
+        try:
+            if record and self._broken is None:
+                self._append({"closed": True})
+            self.flush()
+        finally:
+            self._closing.set()
+            self._dirty.set()
+            with self._lock:
+                os.close(self._file)
+                self._file = -1
+            if self._flusher is not None:
+                self._flusher.join()
+
+    def _append(self, event: dict[str, Any]) -> None:
+        line = encode_line(event)
+        with self._lock:
+            if self._file < 0:
+                raise FileRefused(f"the journal {self.path} is closed.")
+            if self._broken is not None:
+                raise FileRefused(self._broken)
+            try:
+                _write_all(self._file, line)
+            except OSError as error:
+                self._take_back(error)
+            self._length += len(line)
+        self._flush_later()
+
+    def _take_back(self, error: OSError) -> None:
+        """Cut half a line off again, so that later events stay readable. Always raises FileRefused."""
+        reason = f"the journal {self.path} cannot be written: {error.strerror or error}. The edit was not made."
+        try:
+            os.ftruncate(self._file, self._length)
+        except OSError:
+            self._broken = f"{reason} Nothing more can be recorded: save elsewhere and open the document again."
+            raise FileRefused(self._broken) from error
+        raise FileRefused(f"{reason} Make room, or save elsewhere.") from error
+
+    def _flush_later(self) -> None:
+        if self._flusher is None:
+            self._flusher = threading.Thread(target=self._flush_loop, name="contact-journal", daemon=True)
+            self._flusher.start()
+        self._dirty.set()
+
+    def _flush_loop(self) -> None:
+        while not self._closing.is_set():
+            self._dirty.wait()
+            self._closing.wait(FLUSH_SECONDS / 2)  # gather what comes within half the window
+            self._dirty.clear()
+            try:
+                self.flush()
+            except OSError as error:  # a disk that fails on fsync may have lost what it had taken
+                self._broken = f"the disk under {self.path} reports {error.strerror or error}; save elsewhere."
+
+
+@dataclass(frozen=True, eq=False)
+class JournalContents:
+    """A journal as read. base: the first document. file_digest: of the document file then, None if none.
+
+    events: the whole events. good_bytes: how far the file is sound. damage: None, or a sentence on what follows.
+    """
+
+    base: ContactDocument
+    base_revision: int
+    file_digest: str | None
+    events: tuple[dict[str, Any], ...]
+    good_bytes: int
+    damage: str | None
+
+    @property
+    def closed(self) -> bool:
+        """Whether the session ended in order."""
+        return bool(self.events) and "closed" in self.events[-1]
+
+    @property
+    def file_digests(self) -> frozenset[str | None]:
+        """Digests of the document file that this journal knows."""
+        return frozenset([self.file_digest, *(event["file"] for event in self.events if "saved" in event)])
+
+    @property
+    def edits(self) -> int:
+        """How many events changed the document."""
+        return sum("do" in event or "goto" in event for event in self.events)
+
+
+def read_journal(path: Path) -> JournalContents:
+    """The sound part of a journal. Raises FileRefused when not even the first line is."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise FileRefused(f"{path} is larger than {MAX_BYTES} bytes; that is no journal.")
+        raw = path.read_bytes()
+    except OSError as error:
+        raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
+    good, damage, records = 0, None, []
+    for number, line in enumerate(_lines(raw), start=1):
+        event = decode_line(line)
+        if event is None:
+            damage = f"line {number} of {path.name} is damaged or was cut off; all before it is whole."
+            break
+        records.append(event)
+        good += len(line)
+    if not records:
+        raise FileRefused(f"{path} is damaged from its first line on; nothing can be recovered from it.")
+    header = records[0]
+    if header.get("journal") != SCHEMA or not isinstance(header.get("version"), int):
+        raise FileRefused(f"{path} is not a {SCHEMA} file.")
+    if header["version"] > VERSION:
+        raise FileRefused(
+            f"{path} was written as {SCHEMA} version {header['version']}; this release reads up to {VERSION}:"
+            " install a newer contact-core. The file is left untouched."
+        )
+    base = document_from_json(header.get("document"), f"the document in {path.name}")
+    return JournalContents(base, int(header["revision"]), header.get("file"), tuple(records[1:]), good, damage)
+
+
+def replay(contents: JournalContents) -> tuple[History, str | None]:
+    """The history that a journal records, and None or a sentence on the event that could not be replayed."""
+    history = History(contents.base, contents.base_revision)
+    for number, event in enumerate(contents.events, start=2):
+        try:
+            _replay_event(history, event)
+        except (ContactError, KeyError, TypeError) as error:
+            return history, f"the event on line {number} cannot be replayed: {error}"
+    return history, None
+
+
+def encode_line(event: dict[str, Any]) -> bytes:
+    """One line of a journal."""
+    body = json.dumps(event, separators=(",", ":"), allow_nan=False).encode()
+    return b"%08x %b\n" % (zlib.crc32(body), body)
+
+
+def decode_line(line: bytes) -> dict[str, Any] | None:
+    """The event of a whole line, or None for a damaged one."""
+    if len(line) < 10 or line[8:9] != b" " or not line.endswith(b"\n"):
+        return None
+    body = line[9:-1]
+    if b"%08x" % zlib.crc32(body) != line[:8]:
+        return None
+    event = json.loads(body)
+    return event if isinstance(event, dict) else None
+
+
+def _replay_event(history: History, event: dict[str, Any]) -> None:
+    if "do" in event:
+        command = command_from_json(event["do"])
+        if event.get("merged"):
+            history.undo()  # the recorded command is the merged one: it takes the place of the last step
+        history.do_as(command, str(event["origin"]), int(event["at"]))
+    elif "goto" in event:
+        history.goto(int(event["goto"]))
+    elif "saved" in event:
+        history.mark_clean()
+
+
+def _lines(raw: bytes) -> Iterator[bytes]:
+    start = 0
+    while start < len(raw):
+        end = raw.find(b"\n", start) + 1 or len(raw)
+        yield raw[start:end]
+        start = end
+
+
+def _write_all(file: int, data: bytes) -> None:
+    view = memoryview(data)
+    while view:
+        view = view[os.write(file, view) :]
