@@ -1,1 +1,38 @@
-""""""
+"""Surfaces and exact geodesics on them.
+
+The names below load when they are first used, and numba when a kernel is first called: `import contact_core.geometry`
+costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contact_core.geometry.mesh import TriangleMesh as TriangleMesh
+    from contact_core.geometry.surface_point import SurfacePoints as SurfacePoints
+    from contact_core.geometry.topology import Topology as Topology
+    from contact_core.geometry.tracing import Trace as Trace
+    from contact_core.geometry.tracing import trace_chains as trace_chains
+    from contact_core.geometry.tracing import trace_geodesic as trace_geodesic
+
+_HOME_OF_NAME = {
+    "TriangleMesh": "mesh",
+    "SurfacePoints": "surface_point",
+    "Topology": "topology",
+    "Trace": "tracing",
+    "trace_chains": "tracing",
+    "trace_geodesic": "tracing",
+}
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOME_OF_NAME.get(name)
+    if home is None:
+        raise AttributeError(f"contact_core.geometry offers {', '.join(sorted(_HOME_OF_NAME))}, but not {name!r}.")
+    return getattr(import_module(f"contact_core.geometry.{home}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(_HOME_OF_NAME)

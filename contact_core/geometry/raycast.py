@@ -18,7 +18,7 @@ import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput
-from contact_core.geometry import _boxes
+from contact_core.geometry import box_kernels, box_tree
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 
@@ -63,9 +63,9 @@ class Locator:
             raise InvalidInput("spatial queries need a mesh with faces, but it has none.")
         Locator.builds += 1
         self.mesh_size = len(mesh.faces)
-        self._tree = _boxes.build(mesh.points, mesh.faces)
+        self._tree = box_tree.build(mesh.points, mesh.faces)
         self._normals = mesh.face_normals
-        self._dipoles: _boxes.Dipoles | None = None
+        self._dipoles: box_tree.Dipoles | None = None
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Locator:
@@ -86,7 +86,7 @@ class Locator:
         zero = ~directions.any(axis=1)
         if zero.any():
             raise InvalidInput(f"directions must not be zero, but that of ray {int(np.argmax(zero))} is.")
-        faces, barycentric, distance = _boxes.cast(self._tree, origins, directions, float(max_distance))
+        faces, barycentric, distance = box_kernels.cast(self._tree, origins, directions, float(max_distance))
         return RayHits(faces, barycentric, distance)
 
     def closest(
@@ -101,7 +101,7 @@ class Locator:
         directions = np.zeros((0, 3)) if facing is None else _rows(facing, "facing")
         if facing is not None and len(directions) != len(points):
             raise InvalidInput(f"facing needs one direction per point: {len(points)}, {len(directions)} came.")
-        faces, barycentric, distance = _boxes.closest(
+        faces, barycentric, distance = box_kernels.closest(
             self._tree, self._normals, points, directions, float(facing_limit), float(max_distance)
         )
         found = faces >= 0
@@ -115,8 +115,8 @@ class Locator:
         """
         points = _rows(points, "points")
         if self._dipoles is None:
-            self._dipoles = _boxes.dipoles(self._tree)
-        return _boxes.winding(self._tree, self._dipoles, points, float(accuracy))
+            self._dipoles = box_tree.dipoles(self._tree)
+        return box_kernels.winding(self._tree, self._dipoles, points, float(accuracy))
 
 
 def _rows(values: Any, name: str) -> FloatArray:

@@ -69,6 +69,15 @@ class SurfacePoints:
         return np.where(length > 1e-12, blended / np.maximum(length, 1e-300), mesh.face_normals[self.faces])
 
     @classmethod
+    def trusted(cls, faces: IntArray, barycentric: FloatArray) -> SurfacePoints:
+        """Adopt the result of a kernel, (k,) and (k, 3), without checks or copies; the arrays become read-only."""
+        points = cls.__new__(cls)
+        faces.setflags(write=False)
+        barycentric.setflags(write=False)
+        points.faces, points.barycentric = faces, barycentric
+        return points
+
+    @classmethod
     def concatenate(cls, batches: Iterable[SurfacePoints]) -> SurfacePoints:
         """One batch out of several, in order."""
         batches = list(batches)

@@ -1,0 +1,167 @@
+"""Kernels for points and directions: what a surface point lies on, and its tangent frame.
+
+A point lies on a vertex, an edge or inside a face: its *place* (kind, element, x, y). Directions at it are complex
+numbers in its tangent frame: of a face, the frame of halfedge 3f; of an edge, that of its lower-index halfedge; of a
+vertex, angles counter-clockwise from its first halfedge, rescaled to 2 pi in all (pi on a boundary).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.jit import kernel
+from contact_core.geometry.topology_kernels import (
+    BOUNDARY_VERTEX,
+    following,
+    preceding,
+)
+
+ON_FACE = np.int64(0)  # element: face; x, y in the frame of halfedge 3f
+ON_EDGE = np.int64(1)  # element: the lower-index halfedge; x along it, y = 0
+ON_VERTEX = np.int64(2)  # element: vertex; x = y = 0
+
+# A point this near to an edge or a vertex, as a fraction of the longest edge of its face, lies on it. A distance, not a
+# barycentric coordinate: in a face a million times longer than high, a barycentric tolerance is a million times off.
+SNAP = 1e-11
+PI = math.pi
+
+
+@kernel
+def place(
+    f: int, b0: float, b1: float, b2: float, tail: IntArray, twin: IntArray, shape: FloatArray
+) -> tuple[int, int, float, float]:
+    """The place of a point given by face and barycentric coordinates."""
+    h = 3 * f
+    l0, l1, l2 = shape[h, 0], shape[h + 1, 0], shape[h + 2, 0]
+    near = SNAP * max(l0, l1, l2)
+    if b1 * l0 + b2 * l2 <= near:
+        return ON_VERTEX, tail[h], 0.0, 0.0
+    if b2 * l1 + b0 * l0 <= near:
+        return ON_VERTEX, tail[h + 1], 0.0, 0.0
+    if b0 * l2 + b1 * l1 <= near:
+        return ON_VERTEX, tail[h + 2], 0.0, 0.0
+    if b2 * shape[h, 2] <= near:
+        return _on_edge(h, b1 / (b0 + b1), twin, shape)
+    if b0 * shape[h + 1, 2] <= near:
+        return _on_edge(h + 1, b2 / (b1 + b2), twin, shape)
+    if b1 * shape[h + 2, 2] <= near:
+        return _on_edge(h + 2, b0 / (b2 + b0), twin, shape)
+    return ON_FACE, f, b1 * l0 + b2 * shape[h, 1], b2 * shape[h, 2]
+
+
+@kernel
+def _on_edge(h: int, t: float, twin: IntArray, shape: FloatArray) -> tuple[int, int, float, float]:
+    """The place at fraction t of halfedge h."""
+    if 0 <= twin[h] < h:
+        return ON_EDGE, twin[h], (1.0 - t) * shape[h, 0], 0.0
+    return ON_EDGE, h, t * shape[h, 0], 0.0
+
+
+@kernel
+def direction_in_face(h: int, shape: FloatArray) -> tuple[float, float]:
+    """The unit direction of halfedge h in the frame of its face."""
+    k = h % 3
+    if k == 0:
+        return 1.0, 0.0
+    base = h - k
+    x, y = shape[base, 1], shape[base, 2]
+    if k == 1:
+        x -= shape[base, 0]
+    else:
+        x, y = -x, -y
+    length = shape[h, 0]
+    return x / length, y / length
+
+
+@kernel
+def turned(x: float, y: float, cos: float, sin: float) -> tuple[float, float]:
+    """(x + iy)(cos + i sin)."""
+    return x * cos - y * sin, x * sin + y * cos
+
+
+@kernel
+def turned_back(x: float, y: float, cos: float, sin: float) -> tuple[float, float]:
+    """(x + iy)(cos - i sin)."""
+    return x * cos + y * sin, y * cos - x * sin
+
+
+@kernel
+def corner_angle(h: int, shape: FloatArray) -> float:
+    """The angle of the face at the tail of halfedge h (radians)."""
+    return math.atan2(shape[h, 2], shape[h, 1])
+
+
+@kernel
+def angle_round_vertex(h: int, x: float, y: float, shape: FloatArray) -> float:
+    """The angle at the tail of h, from its first halfedge, of direction (x, y) in the frame of h; not rescaled.
+
+    Unwrapped round the middle of the corner: a direction that rounding put just outside stays just outside.
+    """
+    half = 0.5 * corner_angle(h, shape)
+    u, v = turned_back(x, y, math.cos(half), math.sin(half))
+    return shape[h, 3] + half + math.atan2(v, u)
+
+
+@kernel
+def vertex_scale(v: int, angle_sum: FloatArray, kind: IntArray) -> float:
+    """Factor from angles round a vertex to angles of its tangent frame."""
+    return (PI if kind[v] == BOUNDARY_VERTEX else 2.0 * PI) / angle_sum[v]
+
+
+@kernel
+def corner_of(f: int, v: int, tail: IntArray) -> int:
+    """The halfedge of face f that leaves vertex v."""
+    if tail[3 * f] == v:
+        return 3 * f
+    return 3 * f + 1 if tail[3 * f + 1] == v else 3 * f + 2
+
+
+@kernel
+def corner_at_angle(v: int, angle: float, twin: IntArray, shape: FloatArray, first: IntArray) -> tuple[int, float]:
+    """The corner (by its halfedge) of v that holds an angle round it, and the angle within that corner."""
+    h = first[v]
+    while True:
+        onward = twin[preceding(h)]
+        if onward < 0 or onward == first[v] or angle < shape[onward, 3]:
+            return h, min(max(angle - shape[h, 3], 0.0), corner_angle(h, shape))
+        h = onward
+
+
+@kernel
+def heading_at(
+    on: int,
+    element: int,
+    h: int,
+    x: float,
+    y: float,
+    tail: IntArray,
+    twin: IntArray,
+    shape: FloatArray,
+    angle_sum: FloatArray,
+    kind: IntArray,
+) -> tuple[float, float]:
+    """Unit forward direction of a path that arrives in the face of h along (x, y) in the frame of h.
+
+    In the tangent frame of the place where it ends. At a vertex the direction backwards is what lies in the face,
+    and forwards is opposite to it in the rescaled frame.
+    """
+    length = math.hypot(x, y)
+    x, y = x / length, y / length
+    cos, sin = direction_in_face(h, shape)
+    fx, fy = turned(x, y, cos, sin)  # in the frame of the face
+    if on == ON_FACE:
+        return fx, fy
+    if on == ON_EDGE:
+        if element // 3 == h // 3:
+            cos, sin = direction_in_face(element, shape)
+            return turned_back(fx, fy, cos, sin)
+        cos, sin = direction_in_face(twin[element], shape)
+        return turned_back(-fx, -fy, cos, sin)
+    corner = corner_of(h // 3, element, tail)
+    cos, sin = direction_in_face(corner, shape)
+    bx, by = turned_back(-fx, -fy, cos, sin)
+    angle = angle_round_vertex(corner, bx, by, shape) * vertex_scale(element, angle_sum, kind)
+    return -math.cos(angle), -math.sin(angle)

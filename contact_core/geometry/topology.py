@@ -1,0 +1,116 @@
+"""Connectivity and intrinsic geometry of a triangle mesh, built once per mesh by kernels.
+
+Halfedge h = 3 f + k runs from corner k of face f to corner (k + 1) % 3. The frame of a halfedge has its origin at
+the tail and its x axis along it; the face lies on the side of positive y. Only the region that a query walks over
+needs to be manifold: what is not is marked BLOCKED, and a query that reaches it says where.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.errors import InvalidInput, NotManifold
+from contact_core.geometry.mesh import TriangleMesh
+
+BOUNDARY: Final = -1  # a twin: no face on the other side
+BLOCKED: Final = -2  # a twin: the edge is not manifold, or its face has no three corners
+INTERIOR_VERTEX: Final = 0
+BOUNDARY_VERTEX: Final = 1
+BLOCKED_VERTEX: Final = 2  # its faces do not form one fan
+UNUSED_VERTEX: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Halfedges of n points and m faces; read-only arrays.
+
+    tail: (3m,) vertex that a halfedge leaves. Corners joined by an edge of no length count as one vertex, the
+        one of lowest index.
+    twin: (3m,) the opposite halfedge, BOUNDARY or BLOCKED.
+    shape: (3m, 4) length; apex x, y in the halfedge's frame (surface units); angle of the halfedge at its tail,
+        counter-clockwise from the tail's first halfedge (radians, not rescaled).
+    first: (n,) first halfedge of each vertex; on a boundary the clockwise-most. -1 where unused.
+    angle_sum: (n,) sum of the corner angles round each vertex (radians).
+    kind: (n,) INTERIOR_VERTEX, BOUNDARY_VERTEX, BLOCKED_VERTEX or UNUSED_VERTEX.
+    """
+
+    tail: IntArray
+    twin: IntArray
+    shape: FloatArray
+    first: IntArray
+    angle_sum: FloatArray
+    kind: IntArray
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> Topology:
+        """The topology of a mesh: built at the first call (about a second per million faces), then kept on it."""
+        kept = mesh.__dict__.get("_topology")
+        if kept is None:
+            kept = mesh.__dict__["_topology"] = cls._build(mesh)
+        return kept  # type: ignore[no-any-return]
+
+    @classmethod
+    def _build(cls, mesh: TriangleMesh) -> Topology:
+        from contact_core.geometry import topology_kernels as kernels
+
+        n, count = len(mesh.points), 3 * len(mesh.faces)
+        shape = np.zeros((count, 4))
+        tail = mesh.faces.ravel()
+        lengthless = kernels.measure(mesh.points, mesh.faces, shape)
+        if lengthless:
+            tail = np.empty(count, np.int64)
+            kernels.merge_lengthless_edges(mesh.faces, shape, np.arange(n), tail)
+            tail.setflags(write=False)
+        degree = np.zeros(n, np.int64)
+        twin = np.full(count, BOUNDARY, np.int64)
+        kernels.pair_halfedges(tail, degree, np.full(n, -1, np.int64), np.empty(count, np.int64), twin)
+        first = np.full(n, -1, np.int64)
+        angle_sum = np.zeros(n)
+        kind = np.full(n, UNUSED_VERTEX, np.int64)
+        kernels.order_fans(tail, twin, shape, degree, first, angle_sum, kind)
+        for array in (twin, shape, first, angle_sum, kind):
+            array.setflags(write=False)
+        return cls(tail, twin, shape, first, angle_sum, kind)
+
+    @property
+    def is_manifold(self) -> bool:
+        """Whether no edge and no vertex is blocked."""
+        return not ((self.twin == BLOCKED).any() or (self.kind == BLOCKED_VERTEX).any())
+
+    @property
+    def boundary_halfedges(self) -> IntArray:
+        """(b,) halfedges with no face on the other side."""
+        return np.flatnonzero(self.twin == BOUNDARY)
+
+    def scale(self, vertex: int) -> float:
+        """Factor from corner angles to the angles of the vertex's tangent frame: 2 pi (boundary: pi) / angle sum."""
+        whole = np.pi if self.kind[vertex] == BOUNDARY_VERTEX else 2.0 * np.pi
+        return float(whole / self.angle_sum[vertex])
+
+    def refuse_halfedge(self, halfedge: int, doing: str) -> NotManifold:
+        """The error for a query that met a blocked halfedge."""
+        face, k = divmod(int(halfedge), 3)
+        a, b = int(self.tail[halfedge]), int(self.tail[3 * face + (k + 1) % 3])
+        corners = self.tail[3 * face : 3 * face + 3].tolist()
+        if len(set(corners)) < 3:
+            return NotManifold(
+                f"{doing} needs a face with three distinct corners, but face {face} has only the corners "
+                f"{sorted(set(corners))}. Merge doubled points and delete that face, or stay on a neighbouring face."
+            )
+        return NotManifold(
+            f"{doing} needs a manifold surface, but the edge {a}-{b} of face {face} is shared by more than two faces, "
+            f"or by faces that are oriented against each other. Repair the mesh there, or stay away from that edge."
+        )
+
+    def refuse_vertex(self, vertex: int, doing: str) -> InvalidInput:
+        """The error for a query that met a vertex with no single fan of faces."""
+        if self.kind[vertex] == UNUSED_VERTEX:
+            return InvalidInput(f"{doing} needs a point on the surface, but no face uses vertex {int(vertex)}.")
+        return NotManifold(
+            f"{doing} needs a manifold surface, but the faces round vertex {int(vertex)} do not form a single fan. "
+            f"Split that vertex, or stay away from it."
+        )

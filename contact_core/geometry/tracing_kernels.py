@@ -1,0 +1,322 @@
+"""Kernels of the exponential map: straight walks over the faces (Polthier and Schmies 2006).
+
+A walk lives in the frame of one halfedge at a time. The frame's apex lies left or right of the ray: one cross product
+chooses the edge that the ray leaves through. A ray that meets a vertex leaves it with equal angles on both sides.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.jit import kernel
+from contact_core.geometry.tangent_kernels import (
+    ON_EDGE,
+    ON_FACE,
+    ON_VERTEX,
+    PI,
+    SNAP,
+    angle_round_vertex,
+    corner_at_angle,
+    direction_in_face,
+    heading_at,
+    place,
+    turned,
+    turned_back,
+    vertex_scale,
+)
+from contact_core.geometry.topology_kernels import (
+    BLOCKED,
+    BLOCKED_VERTEX,
+    BOUNDARY,
+    BOUNDARY_VERTEX,
+    following,
+    preceding,
+)
+
+DONE = np.int64(0)
+MET_BLOCKED_EDGE = np.int64(1)
+MET_BLOCKED_VERTEX = np.int64(2)
+TOO_LONG = np.int64(3)  # more than MOST_CROSSINGS: a length that no one meant
+NO_ROOM = np.int64(4)  # the polyline buffer is full
+MOST_CROSSINGS = np.int64(20_000_000)
+GRAZE = 1e-12  # radians by which a direction may point out of a boundary and still run along it
+
+
+@kernel
+def start_on_edge(
+    h: int, x: float, dx: float, dy: float, twin: IntArray, shape: FloatArray
+) -> tuple[int, float, float, float]:
+    """Where a walk from an edge point begins: (halfedge of the face it enters or a negative twin, x, dx, dy)."""
+    if dy >= 0.0:
+        return h, x, dx, dy
+    other = twin[h]
+    if other == BOUNDARY and dy > -GRAZE:
+        return h, x, dx, 0.0
+    return other, shape[h, 0] - x, -dx, -dy
+
+
+@kernel
+def start_in_face(
+    f: int, x: float, y: float, dx: float, dy: float, shape: FloatArray
+) -> tuple[int, float, float, float, float]:
+    """A walk from inside face f, moved to the frame of a halfedge that it does not leave through."""
+    h = 3 * f
+    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    tail_side = dx * (0.0 - y) - dy * (0.0 - x)  # positive: the corner lies left of the ray
+    head_side = dx * (0.0 - y) - dy * (length - x)
+    if not (tail_side < 0.0 <= head_side):
+        return h, x, y, dx, dy
+    ux, uy = (ax - length) / shape[h + 1, 0], ay / shape[h + 1, 0]  # halfedge 3f + 1, from the head
+    x, y = turned_back(x - length, y, ux, uy)
+    dx, dy = turned_back(dx, dy, ux, uy)
+    return h + 1, x, y, dx, dy
+
+
+@kernel
+def onward_angle(v: int, back: float, angle_sum: FloatArray, kind: IntArray) -> float:
+    """The angle at which a straight walk leaves vertex v that it reached from angle `back`; negative: off the surface.
+
+    On a boundary straight on means half a turn of the rescaled frame: only a walk along the rim goes on.
+    """
+    total = angle_sum[v]
+    if kind[v] == BOUNDARY_VERTEX:
+        if back < GRAZE:
+            return total
+        return 0.0 if back > total - GRAZE else -1.0
+    angle = back + 0.5 * total
+    return angle - total if angle >= total else angle
+
+
+@kernel
+def record(
+    h: int, fraction_head: float, fraction_apex: float, faces: IntArray, barycentric: FloatArray, i: int
+) -> None:
+    """Write a point of the face of h, given by its weights at the head and the apex of h, as row i."""
+    k = h % 3
+    faces[i] = h // 3
+    barycentric[i, k] = max(1.0 - fraction_head - fraction_apex, 0.0)
+    barycentric[i, (k + 1) % 3] = fraction_head
+    barycentric[i, (k + 2) % 3] = fraction_apex
+
+
+@kernel
+def walk(
+    on: int,
+    element: int,
+    x: float,
+    y: float,
+    zx: float,
+    zy: float,
+    tail: IntArray,
+    twin: IntArray,
+    shape: FloatArray,
+    first: IntArray,
+    angle_sum: FloatArray,
+    kind: IntArray,
+    line_faces: IntArray,
+    line_barycentric: FloatArray,
+    line_end: int,
+) -> tuple[int, int, float, float, float, float, float, int]:
+    """Walk straight from a place along the tangent vector (zx, zy), not zero.
+
+    Crossings are appended to the line buffers from row line_end on, if these have rows. Returns (status; the halfedge
+    in whose frame the walk ends, or the blocked element, or -1 if it could not leave its start; x, y; direction x, y;
+    remaining length; line_end).
+    """
+    remaining = math.hypot(zx, zy)
+    dx, dy = zx / remaining, zy / remaining
+    h, vertex, angle = -1, -1, 0.0
+    if on == ON_FACE:
+        h, x, y, dx, dy = start_in_face(element, x, y, dx, dy, shape)
+    elif on == ON_EDGE:
+        h, x, dx, dy = start_on_edge(element, x, dx, dy, twin, shape)
+        if h == BLOCKED:
+            return MET_BLOCKED_EDGE, element, x, y, dx, dy, remaining, line_end
+        if h == BOUNDARY:
+            return DONE, -1, x, y, dx, dy, remaining, line_end
+    else:
+        vertex = element
+        angle = math.atan2(dy, dx)
+        if angle < -GRAZE or (angle < 0.0 and kind[vertex] != BOUNDARY_VERTEX):
+            angle += 2.0 * PI
+        if kind[vertex] == BOUNDARY_VERTEX and angle > PI + GRAZE:
+            return DONE, -1, x, y, dx, dy, remaining, line_end
+        angle /= vertex_scale(vertex, angle_sum, kind)
+
+    for _ in range(MOST_CROSSINGS):
+        from_vertex = vertex >= 0
+        if from_vertex:
+            if kind[vertex] == BLOCKED_VERTEX:
+                return MET_BLOCKED_VERTEX, vertex, x, y, dx, dy, remaining, line_end
+            h, angle = corner_at_angle(vertex, angle, twin, shape, first)
+            x, y, dx, dy = 0.0, 0.0, math.cos(angle), math.sin(angle)
+            vertex = -1
+        length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+        right = from_vertex or dx * (ay - y) - dy * (ax - x) > 0.0
+        if right:  # through the edge from the head to the apex
+            edge, ox, ex, ey = following(h), length, ax - length, ay
+        else:  # through the edge from the tail to the apex
+            edge, ox, ex, ey = preceding(h), 0.0, ax, ay
+        size = shape[edge, 0]
+        near = SNAP * size
+        across = dx * ey - dy * ex
+        if across == 0.0:  # along a face without area
+            step, t = max((length - x) if dx > 0.0 else x, 0.0), 0.0
+        else:
+            step = max(((ox - x) * ey + y * ex) / across, 0.0)
+            t = min(max(((ox - x) * dy + y * dx) / across, 0.0), 1.0)
+        if remaining <= step + near:
+            step = min(step, remaining)
+            return DONE, h, x + step * dx, y + step * dy, dx, dy, 0.0, line_end
+        remaining -= step
+        if t * size <= near:
+            t = 0.0
+        elif (1.0 - t) * size <= near:
+            t = 1.0
+        if len(line_faces) > 0:
+            if line_end >= len(line_faces):
+                return NO_ROOM, h, x, y, dx, dy, remaining, line_end
+            record(h, 1.0 - t if right else 0.0, t, line_faces, line_barycentric, line_end)
+            line_end += 1
+        x, y = ox + t * ex, t * ey
+        ux, uy = ex / size, ey / size
+        if t == 0.0 or t == 1.0:
+            if t == 1.0:
+                corner = preceding(h)
+                bx, by = turned_back(dx, dy, ax / shape[corner, 0], ay / shape[corner, 0])
+            elif right:
+                corner = edge
+                bx, by = turned_back(-dx, -dy, ux, uy)
+            else:
+                corner = h
+                bx, by = -dx, -dy
+            vertex = tail[corner]
+            if kind[vertex] == BLOCKED_VERTEX:
+                return MET_BLOCKED_VERTEX, vertex, x, y, dx, dy, remaining, line_end
+            angle = onward_angle(vertex, angle_round_vertex(corner, bx, by, shape), angle_sum, kind)
+            if angle < 0.0:
+                return DONE, h, x, y, dx, dy, remaining, line_end
+            continue
+        other = twin[edge]
+        if other < 0:
+            status = DONE if other == BOUNDARY else MET_BLOCKED_EDGE
+            return status, h if other == BOUNDARY else edge, x, y, dx, dy, remaining, line_end
+        if right:  # the other side runs from the apex to the head
+            x, ux, uy = (1.0 - t) * size, -ux, -uy
+        else:
+            x = t * size
+        dx, dy = turned_back(dx, dy, ux, uy)
+        h, y = other, 0.0
+    return TOO_LONG, h, x, y, dx, dy, remaining, line_end
+
+
+@kernel
+def settle(
+    h: int,
+    x: float,
+    y: float,
+    tail: IntArray,
+    twin: IntArray,
+    shape: FloatArray,
+    faces: IntArray,
+    barycentric: FloatArray,
+    i: int,
+) -> tuple[int, int, float, float]:
+    """Write (x, y) in the frame of h as surface point i and return its place; what lies on an edge or a vertex is
+    written with exact zeros, so that whoever reads the point finds the same place."""
+    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    apex = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
+    head = min(max((x - apex * ax) / length, 0.0), 1.0 - apex)
+    record(h, head, apex, faces, barycentric, i)
+    f = h // 3
+    on, element, px, py = place(f, barycentric[i, 0], barycentric[i, 1], barycentric[i, 2], tail, twin, shape)
+    if on == ON_VERTEX:
+        for k in range(3):
+            barycentric[i, k] = 1.0 if tail[3 * f + k] == element else 0.0
+    elif on == ON_EDGE:
+        edge = element if element // 3 == f else twin[element]
+        k = edge % 3
+        t = px / shape[edge, 0]
+        if edge != element:
+            t = 1.0 - t
+        barycentric[i, k], barycentric[i, (k + 1) % 3], barycentric[i, (k + 2) % 3] = 1.0 - t, t, 0.0
+    return on, element, px, py
+
+
+@kernel
+def trace(
+    start_faces: IntArray,
+    start_barycentric: FloatArray,
+    first_legs: FloatArray,
+    offsets: IntArray,
+    turning_angles: FloatArray,
+    lengths: FloatArray,
+    tail: IntArray,
+    twin: IntArray,
+    shape: FloatArray,
+    first: IntArray,
+    angle_sum: FloatArray,
+    kind: IntArray,
+    faces: IntArray,
+    barycentric: FloatArray,
+    headings: FloatArray,
+    remaining: FloatArray,
+    line_faces: IntArray,
+    line_barycentric: FloatArray,
+    line_offsets: IntArray,
+) -> tuple[int, int, int]:
+    """Trace k chains of straight legs; returns (status, chain, blocked element).
+
+    first_legs (k, 2) tangent vectors at the starts; then, per row of offsets (k + 1,), legs that turn from straight on
+    by turning_angles and run for lengths. Writes faces (k,), barycentric (k, 3), headings (k, 2), remaining (k,), and
+    if the line buffers have rows the crossings, start and end included, with line_offsets (k + 1,).
+    """
+    lines = len(line_faces) > 0
+    cursor = 0
+    for i in range(len(start_faces)):
+        f = start_faces[i]
+        b0, b1, b2 = start_barycentric[i, 0], start_barycentric[i, 1], start_barycentric[i, 2]
+        on, element, x, y = place(f, b0, b1, b2, tail, twin, shape)
+        faces[i], barycentric[i, 0], barycentric[i, 1], barycentric[i, 2] = f, b0, b1, b2
+        zx, zy = first_legs[i, 0], first_legs[i, 1]
+        rest = math.hypot(zx, zy)
+        hx, hy = (1.0, 0.0) if rest < 1e-290 else (zx / rest, zy / rest)
+        if lines:
+            if cursor + 2 > len(line_faces):
+                return NO_ROOM, i, 0
+            line_offsets[i] = cursor
+            line_faces[cursor], line_barycentric[cursor, 0] = f, b0
+            line_barycentric[cursor, 1], line_barycentric[cursor, 2] = b1, b2
+            cursor += 1
+        leg = offsets[i]
+        while True:
+            if rest >= 1e-290:
+                status, h, x, y, dx, dy, rest, cursor = walk(
+                    on, element, x, y, hx * rest, hy * rest, tail, twin, shape, first, angle_sum, kind,
+                    line_faces, line_barycentric, cursor,
+                )  # fmt: skip
+                if status != DONE:
+                    return status, i, h
+                if h >= 0:
+                    on, element, x, y = settle(h, x, y, tail, twin, shape, faces, barycentric, i)
+                    hx, hy = heading_at(on, element, h, dx, dy, tail, twin, shape, angle_sum, kind)
+            if rest > 0.0 or leg == offsets[i + 1]:
+                break
+            hx, hy = turned(hx, hy, math.cos(turning_angles[leg]), math.sin(turning_angles[leg]))
+            rest = lengths[leg]
+            leg += 1
+        headings[i, 0], headings[i, 1] = hx, hy
+        for j in range(leg, offsets[i + 1]):
+            rest += lengths[j]
+        remaining[i] = rest
+        if lines:
+            if cursor >= len(line_faces):
+                return NO_ROOM, i, 0
+            line_faces[cursor], line_barycentric[cursor, 0] = faces[i], barycentric[i, 0]
+            line_barycentric[cursor, 1], line_barycentric[cursor, 2] = barycentric[i, 1], barycentric[i, 2]
+            cursor += 1
+            line_offsets[i + 1] = cursor
+    return DONE, cursor, 0
