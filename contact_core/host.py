@@ -18,6 +18,8 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
+from contact_core.document.schema import VERSION
+from contact_core.errors import FileRefused
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.plugins.slots import Picture
 from contact_core.pose.rig import Pose
@@ -197,7 +199,10 @@ class Display(HostAdapter, Protocol):
 class Picking(HostAdapter, Protocol):
     @abstractmethod
     def rays(self, pixels: Any) -> tuple[FloatArray, FloatArray]:
-        """World origins (k, 3) and unit directions (k, 3) of the rays through pixel positions (k, 2), y down."""
+        """World origins (k, 3) and unit directions (k, 3) of the rays through screen positions (k, 2).
+
+        In pixels from the top left corner; (0.5, 0.5) is the centre of the first pixel.
+        """
         ...
 
 
@@ -221,6 +226,15 @@ CAPABILITIES: dict[str, type] = {
     "picking": Picking,
     "progress": Progress,
 }
+
+
+def check_overwrite(stored: StoredDocument | None) -> None:
+    """What `store_document` asks first. Raises FileRefused where a newer contact-core wrote what is stored."""
+    if stored is not None and stored.schema > VERSION:
+        raise FileRefused(
+            f"the scene holds a document of schema version {stored.schema}, but this release writes version"
+            f" {VERSION}: install a newer contact-core. What is stored was left untouched."
+        )
 
 
 def capabilities(host: HostAdapter) -> tuple[str, ...]:
