@@ -119,10 +119,14 @@ class PatchPlacement:
 
 @dataclass(frozen=True, eq=False)
 class PlacementResult:
-    """Placements by patch name, and the patches left out with the reason."""
+    """Placements by patch name, and the patches left out with the reason.
+
+    pose: the pose from which they were placed, where the placer changed the one it was given (closed fingers).
+    """
 
     placed: Mapping[str, PatchPlacement]
     left_out: Mapping[str, str]
+    pose: Pose | None = None
 
 
 @runtime_checkable

@@ -1,0 +1,124 @@
+"""Approach and auto-close: bring an open hand to an object and curl its fingers until they touch.
+
+The rule is GraspIt!'s (Miller and Allen 2004): the joints of a digit flex together, and a joint stops when its
+own link or one beyond it touches. The thumb stays out of the approach (else it stops the hand and all fingers
+close on air) and is searched for afterwards, over starts of its first joint.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from contact_builtins.placers.hand_pose import HandPose, flexion_dof
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.errors import InvalidInput
+from contact_core.geometry.surface_point import SurfacePoints
+
+STEP = np.radians(3.0)
+LAST_RATIO = 0.7  # the last joint of a digit curls more slowly, as tendons make it
+TOUCH = 0.002  # of the bounding box diagonal of the hand: nearer than this is touching
+FREE_UPPER = np.radians(100.0)  # for joints without limits
+
+
+def approach(hand: HandPose, direction: FloatArray, without: IntArray) -> None:
+    """Move the hand along `direction` (3,) in rig space until skin that no joint of `without` holds touches.
+
+    It comes from outside, also when it starts inside the object. Raises InvalidInput when it passes by.
+    """
+    tested = np.flatnonzero(~np.isin(hand.owner, without))
+    if not len(tested):
+        raise InvalidInput("the approach leaves out every part of the manipulator; leave some skin to touch with.")
+    way = hand.object_from_rig[:3, :3] @ (direction / np.linalg.norm(direction))
+    points = hand.points(tested)  # (k, 3)
+    field = hand.field
+    reach = float(
+        np.linalg.norm(np.ptp(points, axis=0)) + np.linalg.norm(np.array(field.values.shape) * field.spacing)
+    )
+    middle = field.origin + 0.5 * field.spacing * (np.array(field.values.shape) - 1)
+    ahead = float((middle - points.mean(axis=0)) @ way)  # how far the object lies along the way
+    travelled, end = ahead - reach, ahead + reach
+    tolerance = 0.1 * field.spacing
+    while travelled < end:
+        clear = float(field.sample(points + travelled * way)[0].min())
+        if clear < tolerance:
+            hand.shift = hand.shift + travelled * (direction / np.linalg.norm(direction))
+            return
+        travelled += max(0.9 * clear, 0.5 * tolerance)  # a distance field never overestimates by much
+    raise InvalidInput(
+        "the hand passes the object without touching it: check the coarse object_center and the approach direction."
+    )
+
+
+def close(hand: HandPose, digit: Sequence[int], step: float = STEP) -> None:
+    """Curl the joints of one digit (root to tip) until they touch or reach their limits."""
+    chain = [(joint, dof) for joint in digit if (dof := flexion_dof(hand.chart, joint)) is not None]
+    if not chain:
+        raise InvalidInput(f"no joint of the digit {[hand.rig.joints[j] for j in digit]} can curl.")
+    dofs = np.array([dof for _, dof in chain])
+    rates = np.ones(len(chain))
+    rates[-1] = LAST_RATIO if len(chain) > 1 else 1.0
+    upper = np.where(np.isfinite(hand.chart.upper[dofs]), hand.chart.upper[dofs], FREE_UPPER)
+    vertices, link = _links(hand, [joint for joint, _ in chain])
+    touch = TOUCH * hand.rig.surface.bounding_box_diagonal
+    moving = np.ones(len(chain), bool)
+    while moving.any():
+        touching = link[hand.clearance(vertices) < touch]
+        if len(touching):
+            moving[: touching.max() + 1] = False  # a joint stops when its link or one beyond it touches
+        before = hand.theta[dofs]
+        hand.theta[dofs] = np.where(moving, np.minimum(before + step * rates, np.maximum(upper, before)), before)
+        moving &= hand.theta[dofs] > before
+
+
+def search_thumb(hand: HandPose, digit: Sequence[int], pads: Sequence[SurfacePoints]) -> None:
+    """Try starts of the thumb's first joint, close each, keep the one whose pads lie best on the object.
+
+    pads: points that should touch; the thumb's last link where there are none.
+    """
+    first, rest = digit[0], list(digit[1:])
+    where = hand.chart.rotation_slices[first]
+    lower, upper = (
+        np.where(np.isfinite(b), b, s * np.pi / 4)
+        for b, s in ((hand.chart.lower[where], -1), (hand.chart.upper[where], 1))
+    )
+    fractions = [(0.3, 0.7), (0.1, 0.5, 0.9), (0.05, 0.35, 0.65, 0.95)][3 - len(lower) :]  # twist, spread, flexion
+    start = hand.theta.copy()
+    best: tuple[float, FloatArray] | None = None
+    for chosen in itertools.product(*fractions):
+        hand.theta = start.copy()
+        hand.theta[where] = lower + np.array(chosen) * (upper - lower)
+        close(hand, rest)
+        score = _misfit(hand, digit, pads)
+        if best is None or score < best[0]:
+            best = score, hand.theta.copy()
+    if best is not None:
+        hand.theta = best[1]
+
+
+def _misfit(hand: HandPose, digit: Sequence[int], pads: Sequence[SurfacePoints]) -> float:
+    """How badly pads lie: mean distance, turned-away normals, and skin of the digit that is inside."""
+    length = hand.rig.surface.bounding_box_diagonal
+    skin = hand.skin()
+    tip = np.array([joint for joint in digit if len(hand.vertices_of(np.array([joint])))][-1:])
+    if pads:
+        together = SurfacePoints.concatenate(pads)
+        points, normals = together.positions(skin), together.normals(skin)
+    else:
+        vertices = hand.vertices_of(tip)
+        points, normals = skin.points[vertices], skin.vertex_normals[vertices]
+    distance, outward = hand.field.sample(points)
+    facing = np.einsum("ki,ki->k", normals, outward)  # -1: the pad looks straight at the object
+    inside = hand.field.sample(skin.points[hand.vertices_of(np.array(digit))])[0].min(initial=0.0)
+    return float(np.abs(distance).mean() / length + 0.04 * (1.0 + facing).mean() - 2.0 * min(inside, 0.0) / length)
+
+
+def _links(hand: HandPose, joints: list[int]) -> tuple[IntArray, IntArray]:
+    """Vertices that move with a chain, and for each the place in the chain of the joint that carries it."""
+    place_of = np.full(len(hand.rig.joints), -1)
+    for joint, parent in enumerate(hand.rig.parents):
+        place_of[joint] = joints.index(joint) if joint in joints else (place_of[parent] if parent >= 0 else -1)
+    place = place_of[hand.owner]
+    return np.flatnonzero(place >= 0), place[place >= 0]

@@ -1,0 +1,87 @@
+"""`place = "from pose"`: contacts go where the pads of a coarsely closed hand look.
+
+Settings (recipe table [placer], beside `name`):
+  approach = [x, y, z]        direction in rig space in which the hand moves until it touches; left out: no approach
+  without = ["thumb*"]        joints whose skin the approach does not test
+  close = ["index*", ...]     one digit per pattern, curled until it touches
+  thumb = "thumb*"            the digit that is searched over starts of its first joint
+  far = 0.06                  pads farther away than this, in manipulator lengths, are left out and named
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from contact_builtins.placers.closing import approach, close, search_thumb
+from contact_builtins.placers.hand_pose import HandPose, dominant_joint, matching
+from contact_builtins.placers.pads import Pad, pads_of, place_pad
+from contact_core.arrays import IntArray
+from contact_core.geometry.raycast import Locator
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.job.table import Table
+from contact_core.plugins.slots import PatchPlacement, PlacementRequest, PlacementResult
+from contact_core.pose.body import manipulator_length
+
+FACING = -0.3  # n.n' of a face that a pad may land on: never the far wall of a cup
+
+
+class FromPose:
+    """Approach, auto-close, thumb search, then each pad to the closest point among faces that face it."""
+
+    name = "from pose"
+
+    def place(self, request: PlacementRequest) -> PlacementResult:
+        """Raises InvalidInput for wrong settings, and when the hand cannot reach the object."""
+        options = Table(dict(request.options), "placer")
+        direction = options.vector("approach", None, direction=True)
+        without = options.texts("without", ())
+        digits = options.texts("close", ())
+        thumb = options.text("thumb", None)
+        far = options.number("far", 0.06, above=0.0)
+        options.done()
+        hand = HandPose(request)
+        rig = request.rig
+        if direction is not None:
+            approach(hand, np.array(direction), matching(rig, without, "placer.without"))
+        for pattern in digits:
+            close(hand, matching(rig, (pattern,), "placer.close"))
+        if thumb is not None:
+            joints = matching(rig, (thumb,), "placer.thumb")
+            search_thumb(hand, joints, _pads_on(request.patch_points, dominant_joint(rig), joints, rig.faces))
+        return place_pads(request, hand, far * manipulator_length(rig), facing=FACING)
+
+
+def place_pads(request: PlacementRequest, hand: HandPose, reach: float, facing: float | None) -> PlacementResult:
+    """Each pad of a posed hand to its closest point on the object, within `reach` (object units)."""
+    locator = Locator.of(request.object_mesh)
+    placed: dict[str, PatchPlacement] = {}
+    left_out: dict[str, str] = {}
+    for name, pad in pads_of(request, hand).items():
+        found = _closest(locator, pad, facing)
+        if found is None:
+            left_out[name] = "no face of the object faces it"
+        elif found[1] > reach:
+            left_out[name] = (
+                f"{100 * found[1] / manipulator_length(request.rig):.1f} % of the length away from the object"
+            )
+        else:
+            placed[name] = place_pad(request.object_mesh, pad, found[0])
+    return PlacementResult(placed, left_out, hand.pose())
+
+
+def _closest(locator: Locator, pad: Pad, facing: float | None) -> tuple[SurfacePoints, float] | None:
+    """The closest point to a pad's centre and its distance; among faces that face it with `facing`."""
+    if facing is None:
+        found = locator.closest(pad.centre)
+    else:
+        found = locator.closest(pad.centre, facing=pad.normal, facing_limit=facing)
+    return (found.points, float(found.distance[0])) if found.found[0] else None
+
+
+def _pads_on(
+    patches: Mapping[str, SurfacePoints], owner: IntArray, joints: IntArray, faces: IntArray
+) -> list[SurfacePoints]:
+    """The patches that lie mostly on skin of the given joints."""
+    return [points for points in patches.values() if np.isin(owner[faces[points.faces]], joints).mean() > 0.5]
