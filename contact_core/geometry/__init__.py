@@ -1,6 +1,6 @@
 """Surfaces and exact geodesics on them.
 
-The names below load when they are first used, and numba when a kernel is first called: `import contact_core.geometry`
+The names below load when they are first used, and numba when a kernel is first called: importing this package
 costs next to nothing.
 """
 

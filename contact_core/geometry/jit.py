@@ -14,17 +14,26 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba.core import event
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+# Integer constants of kernels must be int64 like all their integers: numba compiles a function again for each other
+# width and each literal (measured: six copies of one function).
+def constant(value: int) -> int:
+    """A module constant for kernels."""
+    return np.int64(value)  # type: ignore[return-value]
+
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 _kernels: set[int] = set()  # ids of our dispatchers: other people's kernels compile without our notice
 
 
-# numba's cache asks whether a kernel's own file changed, but not whether the kernels that it calls did: machine code
-# compiled from older helpers would live on after an upgrade. So every kernel carries the stamp of all of them.
-_files = [path.stat() for path in sorted(Path(__file__).parent.glob("*.py"))]
+# numba's cache asks whether a kernel's own file changed, but not whether the kernels that it calls did: machine
+# code compiled from older helpers would live on after an upgrade. So every kernel carries the stamp of them all.
+_files = [path.stat() for path in sorted(Path(__file__).parent.glob("*_kernels.py"))]
 _stamp = (max(file.st_mtime for file in _files), sum(file.st_size for file in _files))
 
 
@@ -43,9 +52,10 @@ def kernel(function: Function) -> Function:
     except RuntimeError:  # numba found no directory that it may write to
         dispatcher = numba.njit(**_OPTIONS)(function)
     with contextlib.suppress(AttributeError):  # a numba whose cache looks different inside
-        dispatcher._cache._cache_file._source_stamp = _stamp
+        cache = dispatcher._cache._cache_file
+        cache._source_stamp = (cache._source_stamp, _stamp)
     _kernels.add(id(dispatcher))
-    return dispatcher  # type: ignore[no-any-return]
+    return dispatcher
 
 
 def _switch_reference_counting_off() -> None:
@@ -57,7 +67,7 @@ def _switch_reference_counting_off() -> None:
     _OPTIONS["_nrt"] = False
 
 
-class _Notice(event.Listener):
+class _Notice(event.Listener):  # type: ignore[misc]
     """Says once that a first compile is running, so that nobody believes in a hang."""
 
     shown = False
@@ -65,11 +75,10 @@ class _Notice(event.Listener):
     def on_start(self, event: Any) -> None:
         if not self.shown and id(event.data.get("dispatcher")) in _kernels:
             self.shown = True
-            print(
-                "contact-core: compiling the geodesic kernels, once on this machine (about ten seconds)...",
-                file=sys.stderr,
-                flush=True,
+            sys.stderr.write(
+                "contact-core: compiling geodesic kernels, once on this machine (some ten seconds)...\n"
             )
+            sys.stderr.flush()
 
     def on_end(self, event: Any) -> None:
         pass

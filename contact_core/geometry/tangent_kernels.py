@@ -1,30 +1,24 @@
 """Kernels for points and directions: what a surface point lies on, and its tangent frame.
 
 A point lies on a vertex, an edge or inside a face: its *place* (kind, element, x, y). Directions at it are complex
-numbers in its tangent frame: of a face, the frame of halfedge 3f; of an edge, that of its lower-index halfedge; of a
-vertex, angles counter-clockwise from its first halfedge, rescaled to 2 pi in all (pi on a boundary).
+numbers in its tangent frame: of a face, the frame of halfedge 3f; of an edge, that of its lower-index halfedge; of
+a vertex, angles counter-clockwise from its first halfedge, rescaled to 2 pi in all (pi on a boundary).
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import kernel
-from contact_core.geometry.topology_kernels import (
-    BOUNDARY_VERTEX,
-    following,
-    preceding,
-)
+from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, preceding
 
-ON_FACE = np.int64(0)  # element: face; x, y in the frame of halfedge 3f
-ON_EDGE = np.int64(1)  # element: the lower-index halfedge; x along it, y = 0
-ON_VERTEX = np.int64(2)  # element: vertex; x = y = 0
+ON_FACE = constant(0)  # element: face; x, y in the frame of halfedge 3f
+ON_EDGE = constant(1)  # element: the lower-index halfedge; x along it, y = 0
+ON_VERTEX = constant(2)  # element: vertex; x = y = 0
 
-# A point this near to an edge or a vertex, as a fraction of the longest edge of its face, lies on it. A distance, not a
-# barycentric coordinate: in a face a million times longer than high, a barycentric tolerance is a million times off.
+# A point this near to an edge or a vertex, as a fraction of the longest edge of its face, lies on it. A distance,
+# not a barycentric coordinate: in a face a million times longer than high, that would be a million times off.
 SNAP = 1e-11
 PI = math.pi
 

@@ -51,7 +51,7 @@ class Topology:
         kept = mesh.__dict__.get("_topology")
         if kept is None:
             kept = mesh.__dict__["_topology"] = cls._build(mesh)
-        return kept  # type: ignore[no-any-return]
+        return kept
 
     @classmethod
     def _build(cls, mesh: TriangleMesh) -> Topology:
@@ -87,7 +87,7 @@ class Topology:
         return np.flatnonzero(self.twin == BOUNDARY)
 
     def scale(self, vertex: int) -> float:
-        """Factor from corner angles to the angles of the vertex's tangent frame: 2 pi (boundary: pi) / angle sum."""
+        """Factor from corner angles to angles of the vertex's tangent frame: 2 pi (boundary: pi) / angle sum."""
         whole = np.pi if self.kind[vertex] == BOUNDARY_VERTEX else 2.0 * np.pi
         return float(whole / self.angle_sum[vertex])
 
@@ -99,11 +99,11 @@ class Topology:
         if len(set(corners)) < 3:
             return NotManifold(
                 f"{doing} needs a face with three distinct corners, but face {face} has only the corners "
-                f"{sorted(set(corners))}. Merge doubled points and delete that face, or stay on a neighbouring face."
+                f"{sorted(set(corners))}. Delete that face, or stay on a neighbouring one."
             )
         return NotManifold(
-            f"{doing} needs a manifold surface, but the edge {a}-{b} of face {face} is shared by more than two faces, "
-            f"or by faces that are oriented against each other. Repair the mesh there, or stay away from that edge."
+            f"{doing} needs a manifold surface, but the edge {a}-{b} of face {face} is shared by more than two "
+            f"faces, or by faces oriented against each other. Repair the mesh there, or stay away from that edge."
         )
 
     def refuse_vertex(self, vertex: int, doing: str) -> InvalidInput:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry import topology
-from contact_core.geometry.jit import kernel
+from contact_core.geometry.jit import constant, kernel
 
-BOUNDARY = np.int64(topology.BOUNDARY)
-BLOCKED = np.int64(topology.BLOCKED)
-INTERIOR_VERTEX = np.int64(topology.INTERIOR_VERTEX)
-BOUNDARY_VERTEX = np.int64(topology.BOUNDARY_VERTEX)
-BLOCKED_VERTEX = np.int64(topology.BLOCKED_VERTEX)
+BOUNDARY = constant(topology.BOUNDARY)
+BLOCKED = constant(topology.BLOCKED)
+INTERIOR_VERTEX = constant(topology.INTERIOR_VERTEX)
+BOUNDARY_VERTEX = constant(topology.BOUNDARY_VERTEX)
+BLOCKED_VERTEX = constant(topology.BLOCKED_VERTEX)
 
 
 @kernel

@@ -51,7 +51,7 @@ def trace_geodesic(mesh: TriangleMesh, starts: SurfacePoints, vectors: Any, *, p
     """The exponential map of k starts along vectors (k,), complex, surface units, in the starts' tangent frames.
 
     Straight through vertices: equal angles on both sides in the rescaled frame. A boundary stops the walk. Raises
-    InvalidInput, and NotManifold where a walk meets a place that is not manifold. Source: Polthier and Schmies 2006.
+    InvalidInput, and NotManifold where a walk meets a place that is not. Source: Polthier and Schmies 2006.
     """
     return trace_chains(mesh, starts, vectors, _NO_OFFSETS, _NO_NUMBERS, _NO_NUMBERS, polyline=polyline)
 
@@ -69,7 +69,7 @@ def trace_chains(
     """Trace k chains of straight legs: the exact inverse of `log_map`.
 
     first_leg: (k,) complex tangent vectors at the starts. Chain i goes on with legs offsets[i]:offsets[i + 1]: each
-    turns by turning_angles (radians, counter-clockwise from straight on, in the tangent frame) and runs for lengths.
+    turns by turning_angles (radians, counter-clockwise from straight on, tangent frame) and runs for lengths.
     remaining counts all legs that were not walked. Raises as trace_geodesic.
     """
     from contact_core.geometry.tracing_kernels import NO_ROOM, trace
@@ -150,8 +150,8 @@ def _refusal(topology: Topology, status: int, which: int, element: int) -> Excep
     if status == kernels.MET_BLOCKED_VERTEX:
         return topology.refuse_vertex(element, "tracing a geodesic")
     return InvalidInput(
-        f"geodesic {which} would cross more than {kernels.MOST_CROSSINGS} edges. Its length is far too great for this "
-        f"surface: check the units of the vectors."
+        f"geodesic {which} would cross more than {kernels.MOST_CROSSINGS} edges. Its length is far too great for "
+        f"this surface: check the units of the vectors."
     )
 
 

@@ -1,17 +1,16 @@
 """Kernels of the exponential map: straight walks over the faces (Polthier and Schmies 2006).
 
-A walk lives in the frame of one halfedge at a time. The frame's apex lies left or right of the ray: one cross product
-chooses the edge that the ray leaves through. A ray that meets a vertex leaves it with equal angles on both sides.
+A walk lives in the frame of one halfedge at a time. The frame's apex lies left or right of the ray: one cross
+product chooses the edge that the ray leaves through. A ray that meets a vertex leaves it with equal angles on both
+sides.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import kernel
+from contact_core.geometry.jit import constant, kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -20,7 +19,6 @@ from contact_core.geometry.tangent_kernels import (
     SNAP,
     angle_round_vertex,
     corner_at_angle,
-    direction_in_face,
     heading_at,
     place,
     turned,
@@ -36,12 +34,12 @@ from contact_core.geometry.topology_kernels import (
     preceding,
 )
 
-DONE = np.int64(0)
-MET_BLOCKED_EDGE = np.int64(1)
-MET_BLOCKED_VERTEX = np.int64(2)
-TOO_LONG = np.int64(3)  # more than MOST_CROSSINGS: a length that no one meant
-NO_ROOM = np.int64(4)  # the polyline buffer is full
-MOST_CROSSINGS = np.int64(20_000_000)
+DONE = constant(0)
+MET_BLOCKED_EDGE = constant(1)
+MET_BLOCKED_VERTEX = constant(2)
+TOO_LONG = constant(3)  # more than MOST_CROSSINGS: a length that no one meant
+NO_ROOM = constant(4)  # the polyline buffer is full
+MOST_CROSSINGS = constant(5_000_000)
 GRAZE = 1e-12  # radians by which a direction may point out of a boundary and still run along it
 
 
@@ -77,7 +75,7 @@ def start_in_face(
 
 @kernel
 def onward_angle(v: int, back: float, angle_sum: FloatArray, kind: IntArray) -> float:
-    """The angle at which a straight walk leaves vertex v that it reached from angle `back`; negative: off the surface.
+    """The angle at which a straight walk leaves vertex v that it reached from angle `back`; negative: nowhere.
 
     On a boundary straight on means half a turn of the rescaled frame: only a walk along the rim goes on.
     """
@@ -122,9 +120,9 @@ def walk(
 ) -> tuple[int, int, float, float, float, float, float, int]:
     """Walk straight from a place along the tangent vector (zx, zy), not zero.
 
-    Crossings are appended to the line buffers from row line_end on, if these have rows. Returns (status; the halfedge
-    in whose frame the walk ends, or the blocked element, or -1 if it could not leave its start; x, y; direction x, y;
-    remaining length; line_end).
+    Crossings are appended to the line buffers from row line_end on, if these have rows. Returns (status; the
+    halfedge in whose frame the walk ends, or the blocked element, or -1 if it could not leave its start; x, y;
+    direction x, y; remaining length; line_end).
     """
     remaining = math.hypot(zx, zy)
     dx, dy = zx / remaining, zy / remaining
@@ -270,9 +268,9 @@ def trace(
 ) -> tuple[int, int, int]:
     """Trace k chains of straight legs; returns (status, chain, blocked element).
 
-    first_legs (k, 2) tangent vectors at the starts; then, per row of offsets (k + 1,), legs that turn from straight on
-    by turning_angles and run for lengths. Writes faces (k,), barycentric (k, 3), headings (k, 2), remaining (k,), and
-    if the line buffers have rows the crossings, start and end included, with line_offsets (k + 1,).
+    first_legs (k, 2) tangent vectors at the starts; then, per row of offsets (k + 1,), legs that turn from straight
+    on by turning_angles and run for lengths. Writes faces (k,), barycentric (k, 3), headings (k, 2) and
+    remaining (k,); if the line buffers have rows the crossings, start and end included, with line_offsets (k + 1,).
     """
     lines = len(line_faces) > 0
     cursor = 0
