@@ -29,12 +29,18 @@ def contact_placers() -> list[object]:
 
 @hookimpl
 def contact_pose_solvers() -> list[object]:
-    return []
+    return [
+        "contact_core.pose.levenberg_marquardt:LevenbergMarquardt",
+    ]
 
 
 @hookimpl
 def contact_pose_terms() -> list[object]:
-    return []
+    return [
+        "contact_core.pose.terms:DistanceTerm",
+        "contact_core.pose.terms:NormalTerm",
+        "contact_core.pose.terms:PriorTerm",
+    ]
 
 
 @hookimpl

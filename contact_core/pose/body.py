@@ -1,0 +1,142 @@
+"""Bodies of a pose problem: skinned rigs, rigid things that may move, and fixed surfaces, all as rigs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray, frozen
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.rig import JointFreedom, Pose, Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One thing of a pose problem and where it stands.
+
+    pose: where the solve starts. world_from_rig: (4, 4) places rig space in the problem's world (rigid or with
+    a uniform scale, so that surfaces of different units meet).
+    """
+
+    name: str
+    rig: Rig
+    pose: Pose
+    world_from_rig: FloatArray = field(default_factory=lambda: np.eye(4))
+
+    def __post_init__(self) -> None:
+        placed = frozen(self.world_from_rig, np.float64, (4, 4), f"world_from_rig of {self.name}")
+        object.__setattr__(self, "world_from_rig", placed)
+
+    @classmethod
+    def skinned(
+        cls,
+        rig: Rig,
+        *,
+        name: str | None = None,
+        pose: Pose | None = None,
+        world_from_rig: FloatArray | None = None,
+    ) -> Body:
+        """A rig in a pose (its rest pose by default)."""
+        return cls(
+            name or rig.name, rig, pose or Pose.rest(rig), np.eye(4) if world_from_rig is None else world_from_rig
+        )
+
+    @classmethod
+    def rigid(
+        cls, name: str, mesh: TriangleMesh, *, world_from_surface: FloatArray | None = None, movable: bool = False
+    ) -> Body:
+        """A surface that stays where it is, or (`movable`) that the solve may move as a whole."""
+        rig = rigid_rig(name, mesh, movable=movable)
+        return cls(name, rig, Pose.rest(rig), np.eye(4) if world_from_surface is None else world_from_surface)
+
+
+def rigid_rig(name: str, mesh: TriangleMesh, *, movable: bool) -> Rig:
+    """A rig of one joint at the centre of a mesh that carries all of it."""
+    n = len(mesh.points)
+    centre = np.eye(4)
+    centre[:3, 3] = mesh.points.mean(axis=0) if n else 0.0
+    return Rig(
+        name=name,
+        joints=(name,),
+        parents=np.array([-1]),
+        rest_local=centre[None],
+        bind_world=centre[None],
+        bind_points=mesh.points,
+        faces=mesh.faces,
+        skin_joints=np.zeros((n, 1), np.int64),
+        skin_weights=np.ones((n, 1)),
+        freedoms=(JointFreedom("ball" if movable else "fixed", translates=movable),),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PairedPoints:
+    """One contact pair as a solver sees it: k points on one body that shall meet k points on another (or itself).
+
+    manipulator, object: names of bodies. weights: (k,) relative weight of each point, by default each point's
+    share; their sum over all pairs is what distances are averaged over.
+    """
+
+    name: str
+    manipulator: str
+    manipulator_points: SurfacePoints
+    object: str
+    object_points: SurfacePoints
+    weights: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        k = len(self.manipulator_points)
+        if len(self.object_points) != k:
+            raise InvalidInput(
+                f"contact {self.name!r} pairs point by point, but has {k} points on {self.manipulator} and"
+                f" {len(self.object_points)} on {self.object}."
+            )
+        given = np.ones(k) if self.weights is None else self.weights
+        weights = frozen(given, np.float64, (k,), f"weights of contact {self.name!r}")
+        if (weights < 0).any():
+            raise InvalidInput(
+                f"weights of contact {self.name!r} must not be negative, but {weights.min():.3g} came."
+            )
+        object.__setattr__(self, "weights", weights)
+
+    @cached_property
+    def total_weight(self) -> float:
+        """Sum of the weights."""
+        return float(self.weights.sum()) if self.weights is not None else 0.0
+
+
+def manipulator_length(rig: Rig, joints: IntArray | None = None) -> float:
+    """The largest rest extent of the skin that `joints` drive (all by default), surface units.
+
+    A vertex belongs to the joint that holds it strongest. This is the length that contacts are judged
+    against: a body's hand is measured by the hand, not by the body.
+    """
+    points = rig.surface.points
+    if joints is not None:
+        owner = rig.skin_joints[np.arange(len(points)), rig.skin_weights.argmax(axis=1)]
+        driven = np.isin(owner, joints)
+        points = points[driven] if driven.any() else points
+    return diameter(points)
+
+
+def diameter(points: FloatArray) -> float:
+    """The largest distance between two of the points (n, 3)."""
+    if len(points) < 2:
+        return 0.0
+    from scipy.spatial import ConvexHull, QhullError
+
+    corners = points
+    if len(points) > 50:
+        try:
+            corners = points[ConvexHull(points).vertices]
+        except QhullError:  # flat or thin: all points are corners
+            corners = np.unique(points, axis=0)
+    largest = 0.0
+    for start in range(0, len(corners), 256):  # blocks keep the memory small
+        gap = corners[start : start + 256, None] - corners[None]
+        largest = max(largest, float(np.einsum("abi,abi->ab", gap, gap).max()))
+    return float(np.sqrt(largest))

@@ -1,0 +1,247 @@
+"""The chart of a pose: joint transforms as a vector of angles and translations, and how they move.
+
+A pose is local joint transforms; a solver needs numbers. `Chart` turns one into the other for one rig:
+theta (d,) holds every dof of every joint in joint order, rotations before translations, as offsets from
+rest. What a freedom cannot express (a hinge bent sideways by hand, a scaled joint) is kept as a constant
+`leftover` behind the joint's own motion, so a pose goes into the chart and comes back unchanged.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from contact_core.arrays import BoolArray, FloatArray, IntArray
+from contact_core.errors import InvalidInput
+from contact_core.pose.rig import ROTATION_DOFS, Pose, Rig
+from contact_core.pose.rotations import axis_numbers, cross_matrices, euler_chain, exponential, nearest_rotation
+
+_AXIS_LETTERS = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Where the joints of a rig are at one theta, and how each dof moves them.
+
+    world: (j, 4, 4) world_from_joint. generators: (d, 3, 4) velocity fields: when dof q grows, every point p
+    that moves with its joint (or with a joint below it) moves by generators[q] @ (p, 1).
+    """
+
+    world: FloatArray
+    generators: FloatArray
+
+
+class Chart:
+    """theta <-> local transforms of one rig. Immutable after construction.
+
+    joint_of_dof: (d,) which joint. is_translation: (d,). lower, upper: (d,) limits, offsets from rest.
+    dof_names: "index_1.x" (hinge, ball, Euler turns), "wrist.tx" (translations).
+    """
+
+    def __init__(self, rig: Rig, world_from_rig: FloatArray | None = None) -> None:
+        self.rig = rig
+        self.world_from_rig = np.eye(4) if world_from_rig is None else np.asarray(world_from_rig, float)
+        rotations = np.array([ROTATION_DOFS[f.kind] for f in rig.freedoms], np.int64)
+        translations = np.array([3 * f.translates for f in rig.freedoms], np.int64)
+        starts = np.concatenate([[0], np.cumsum(rotations + translations)])
+        self.rotation_slices = [slice(int(s), int(s + r)) for s, r in zip(starts[:-1], rotations, strict=True)]
+        self.translation_slices = [
+            slice(int(s + r), int(s + r + t)) for s, r, t in zip(starts[:-1], rotations, translations, strict=True)
+        ]
+        self.size = int(starts[-1])
+        self.joint_of_dof: IntArray = np.repeat(np.arange(len(rig.joints)), rotations + translations)
+        self._lay_out_dofs()
+        self.levels = _levels(rig.parents)
+        self.frames = np.array([f.frame for f in rig.freedoms]).reshape(-1, 3, 3)
+        self.is_rigid = _is_rigid(rig.rest_local) and _is_rigid(self.world_from_rig[None])
+
+    def _lay_out_dofs(self) -> None:
+        names: list[str] = []
+        lower: list[float] = []
+        upper: list[float] = []
+        prior_weight: list[float] = []
+        locked: list[bool] = []
+        rotvec_rows: list[tuple[int, int, int]] = []  # dof, joint, component: hinges and balls
+        euler_joints: list[int] = []
+        for j, (joint, freedom) in enumerate(zip(self.rig.joints, self.rig.freedoms, strict=True)):
+            count = ROTATION_DOFS[freedom.kind]
+            letters = freedom.order.lower() if freedom.kind == "euler" else _AXIS_LETTERS
+            if freedom.kind in ("hinge", "ball"):
+                rotvec_rows += [(len(names) + i, j, i) for i in range(count)]
+            elif freedom.kind == "euler":
+                euler_joints.append(j)
+            names += [f"{joint}.{letters[i]}" for i in range(count)]
+            lower += list(freedom.lower if freedom.lower is not None else [])
+            upper += list(freedom.upper if freedom.upper is not None else [])
+            prior_weight += list(freedom.prior_weight if freedom.prior_weight is not None else [])
+            locked += list(freedom.locked if freedom.locked is not None else [])
+            if freedom.translates:
+                names += [f"{joint}.t{letter}" for letter in _AXIS_LETTERS]
+                lower += 3 * [-np.inf]
+                upper += 3 * [np.inf]
+                prior_weight += 3 * [0.0]
+                locked += 3 * [False]
+        self.dof_names = tuple(names)
+        self.lower, self.upper = np.array(lower, float), np.array(upper, float)
+        self.prior_weight: FloatArray = np.array(prior_weight, float)
+        self.locked: BoolArray = np.array(locked, bool)
+        self.is_translation: BoolArray = np.zeros(self.size, bool)
+        for moved in self.translation_slices:
+            self.is_translation[moved] = True
+        rows = np.array(rotvec_rows, np.int64).reshape(-1, 3)
+        self._rotvec_dof, self._rotvec_joint, self._rotvec_component = rows.T
+        self._rotvec_joints = np.unique(self._rotvec_joint)
+        self._euler_joints = np.array(euler_joints, np.int64)
+        self._euler_dofs = np.array(
+            [np.arange(s.start, s.stop) for s in (self.rotation_slices[j] for j in euler_joints)], np.int64
+        ).reshape(-1, 3)
+        self._euler_axes = np.array(
+            [axis_numbers(self.rig.freedoms[j].order) for j in euler_joints], np.int64
+        ).reshape(-1, 3)
+        movers = [(s.start, j) for j, s in enumerate(self.translation_slices) if s.stop > s.start]
+        self._moving_joints = np.array([j for _, j in movers], np.int64)
+        self._moving_dofs = np.array([[s, s + 1, s + 2] for s, _ in movers], np.int64).reshape(-1, 3)
+
+    @cached_property
+    def is_root(self) -> BoolArray:
+        """(d,) the dofs that place the whole manipulator: those of root joints and of joints that translate."""
+        roots = (self.rig.parents < 0) | np.array([f.translates for f in self.rig.freedoms], bool)
+        return roots[self.joint_of_dof]
+
+    @cached_property
+    def moves(self) -> BoolArray:
+        """(d, j) whether a dof moves a joint: its own joint and all below it."""
+        below = np.eye(len(self.rig.joints), dtype=bool)  # below[a, b]: b is a or below a
+        for joint, parent in enumerate(self.rig.parents):
+            if parent >= 0:
+                below[:, joint] |= below[:, parent]
+        return below[self.joint_of_dof]
+
+    def turns(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Motions (j, 4, 4) of the joints within their rest frames, turning axes (d, 3), offsets (j, 3).
+
+        Axes are in the joint's rest frame: how the joint turns, in that frame, when a dof grows.
+        """
+        j = len(self.rig.joints)
+        rotation = np.broadcast_to(np.eye(3), (j, 3, 3)).copy()
+        axes = np.zeros((self.size, 3))
+        if len(self._rotvec_dof):
+            vectors = np.zeros((j, 3))
+            vectors[self._rotvec_joint, self._rotvec_component] = theta[self._rotvec_dof]
+            turned, left = exponential(vectors[self._rotvec_joints])
+            rotation[self._rotvec_joints] = turned
+            row = np.searchsorted(self._rotvec_joints, self._rotvec_joint)
+            axes[self._rotvec_dof] = left[row, :, self._rotvec_component]
+        if len(self._euler_joints):
+            turned, turning = euler_chain(theta[self._euler_dofs], self._euler_axes)
+            rotation[self._euler_joints] = turned
+            axes[self._euler_dofs] = turning.transpose(0, 2, 1)
+        offset = np.zeros((j, 3))
+        if len(self._moving_joints):
+            offset[self._moving_joints] = theta[self._moving_dofs]
+        motion = np.zeros((j, 4, 4))
+        motion[:, :3, :3] = self.frames @ rotation @ self.frames.transpose(0, 2, 1)
+        motion[:, :3, 3] = offset
+        motion[:, 3, 3] = 1.0
+        axes = np.einsum("dab,db->da", self.frames[self.joint_of_dof], axes)
+        return motion, axes, offset
+
+    def local(self, theta: FloatArray, leftover: FloatArray | None = None) -> FloatArray:
+        """(j, 4, 4) parent_from_joint at theta (d,)."""
+        local = self.rig.rest_local @ self.turns(theta)[0]
+        return local if leftover is None else local @ leftover
+
+    def motion(self, theta: FloatArray, leftover: FloatArray | None = None) -> Motion:
+        """World transforms and generators at theta (d,)."""
+        motion, axes, offset = self.turns(theta)
+        local = self.rig.rest_local @ motion
+        world = world_from_local(self, local if leftover is None else local @ leftover)
+        parents = self.rig.parents
+        base = np.where((parents >= 0)[:, None, None], world[parents], self.world_from_rig)  # (j, 4, 4)
+        frame = base @ self.rig.rest_local  # (j, 4, 4) world_from_rest_frame
+        centre = frame[:, :3, 3] + np.einsum("jab,jb->ja", frame[:, :3, :3], offset)  # (j, 3)
+        dof_frame = frame[self.joint_of_dof, :3, :3]  # (d, 3, 3)
+        generators = np.zeros((self.size, 3, 4))
+        if self.is_rigid and leftover is None:
+            linear = cross_matrices(np.einsum("dab,db->da", dof_frame, axes))
+        else:  # a scaled parent turns a rotation into a shear-like motion: A [axis] A^-1
+            linear = dof_frame @ cross_matrices(axes) @ np.linalg.inv(dof_frame)
+        generators[:, :, :3] = linear
+        generators[:, :, 3] = -np.einsum("dab,db->da", linear, centre[self.joint_of_dof])
+        if len(self._moving_joints):
+            generators[self._moving_dofs, :, 3] = frame[self._moving_joints, :3, :3].transpose(0, 2, 1)
+        return Motion(world, generators)
+
+    def theta_of(self, pose: Pose) -> tuple[FloatArray, FloatArray | None]:
+        """theta (d,) of a pose, and the leftover (j, 4, 4) that the freedoms cannot express (None: nothing).
+
+        Raises InvalidInput when the pose is of another rig.
+        """
+        local = pose_on(self.rig, pose)
+        relative = np.linalg.inv(self.rig.rest_local) @ local
+        theta = np.zeros(self.size)
+        for j, freedom in enumerate(self.rig.freedoms):
+            if freedom.translates:
+                theta[self.translation_slices[j]] = relative[j, :3, 3]
+            if freedom.kind != "fixed":
+                inner = freedom.frame.T @ nearest_rotation(relative[j, :3, :3]) @ freedom.frame
+                theta[self.rotation_slices[j]] = _angles(inner, freedom.kind, freedom.order)
+        leftover = np.linalg.inv(self.turns(theta)[0]) @ relative
+        scale = max(1.0, float(np.abs(self.rig.rest_local[:, :3, 3]).max(initial=0.0)))
+        plain = np.abs(leftover - np.eye(4)).max(initial=0.0) < 1e-9 * scale
+        return theta, None if plain else leftover
+
+
+def pose_on(rig: Rig, pose: Pose) -> FloatArray:
+    """(j, 4, 4) parent_from_joint of a pose in the rig's joint order; joints it does not name stay at rest."""
+    if pose.joints == rig.joints:
+        return pose.local
+    unknown = sorted(set(pose.joints) - set(rig.joints))
+    if unknown:
+        raise InvalidInput(
+            f"a pose for {rig.name} may name its {len(rig.joints)} joints, but names"
+            f" {', '.join(map(repr, unknown[:3]))}; is it a pose of another rig?"
+        )
+    local = rig.rest_local.copy()
+    local[[rig.joint_index(name) for name in pose.joints]] = pose.local
+    return local
+
+
+def world_from_local(chart: Chart, local: FloatArray) -> FloatArray:
+    """(j, 4, 4) world_from_joint, one batched product per level of the tree."""
+    world = np.empty_like(local)
+    roots = chart.levels[0]
+    world[roots] = chart.world_from_rig @ local[roots]
+    for level in chart.levels[1:]:
+        world[level] = world[chart.rig.parents[level]] @ local[level]
+    return world
+
+
+def _levels(parents: IntArray) -> list[IntArray]:
+    """Joints by depth, roots first."""
+    depth = np.zeros(len(parents), np.int64)
+    for joint, parent in enumerate(parents):
+        depth[joint] = 0 if parent < 0 else depth[parent] + 1
+    return [np.flatnonzero(depth == level) for level in range(int(depth.max(initial=0)) + 1)]
+
+
+def _is_rigid(transforms: FloatArray) -> bool:
+    linear = transforms[:, :3, :3]
+    orthogonal = np.abs(linear.transpose(0, 2, 1) @ linear - np.eye(3)).max(initial=0.0) < 1e-9
+    return bool(orthogonal and (np.linalg.det(linear) > 0).all())
+
+
+def _angles(rotation: FloatArray, kind: str, order: str) -> FloatArray:
+    """The rotation dofs of one joint that come nearest to a rotation matrix (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    if kind == "hinge":  # the turn about x that comes nearest
+        return np.array([np.arctan2(rotation[2, 1] - rotation[1, 2], rotation[1, 1] + rotation[2, 2])])
+    if kind == "ball":
+        return np.asarray(Rotation.from_matrix(rotation).as_rotvec())
+    with warnings.catch_warnings():  # in gimbal lock any split of the two turns is right
+        warnings.simplefilter("ignore", UserWarning)
+        return np.asarray(Rotation.from_matrix(rotation).as_euler(order))

@@ -1,0 +1,351 @@
+"""The pose problem: bodies, contact pairs, terms, what may move, within which limits, near which prior."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from contact_core.arrays import BoolArray, FloatArray, IntArray
+from contact_core.errors import InvalidInput
+from contact_core.pose.body import Body, PairedPoints, manipulator_length
+from contact_core.pose.chart import Chart, Motion
+from contact_core.pose.rig import Pose
+from contact_core.pose.skinning import Track, normal_track, point_track
+from contact_core.pose.state import PoseState
+from contact_core.pose.terms import BoundTerm, PoseTerm, paper_terms
+
+Form = Literal["squares", "paper"]
+Limits = Literal["rig", "none", "paper"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """All contact pairs of a problem, one below the other.
+
+    gap: manipulator point minus object point. weights: (k,) sum 1. rows: which rows are whose.
+    """
+
+    gap: Track
+    manipulator_normals: Track
+    object_normals: Track
+    weights: FloatArray
+    rows: Mapping[str, slice]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseProblem:
+    """What a solver gets. Immutable; everything derived is made when first asked for.
+
+    bodies: any number, names unique. contacts: pairs between any two of them, or within one.
+    terms: the objective; the paper's three by default. free: joints or single dofs (names) that may move, per
+    body; None: all. held: names taken out of that again. prior: "rest", "current" or poses by body.
+    form: rho(x) = x^2 ("squares") or |x| ("paper"). limits: those of the rigs within -pi..pi, none at all, or
+    the paper's 0..2 pi (harmful; for comparison). length: manipulator length when it shall not be measured.
+    """
+
+    bodies: tuple[Body, ...]
+    contacts: tuple[PairedPoints, ...]
+    terms: tuple[PoseTerm, ...] = paper_terms()
+    free: Mapping[str, Iterable[str]] | None = None
+    held: Mapping[str, Iterable[str]] | None = None
+    prior: Literal["rest", "current"] | Mapping[str, Pose] = "rest"
+    form: Form = "squares"
+    limits: Limits = "rig"
+    length: float | None = None
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies]
+        if len(set(names)) != len(names) or not names:
+            raise InvalidInput(f"a pose problem needs bodies with unique names, but got {names}.")
+        if self.form not in ("squares", "paper"):
+            raise InvalidInput(f'form is "squares" or "paper", but {self.form!r} came.')
+        if self.limits not in ("rig", "none", "paper"):
+            raise InvalidInput(f'limits are "rig", "none" or "paper", but {self.limits!r} came.')
+        if isinstance(self.prior, str) and self.prior not in ("rest", "current"):
+            raise InvalidInput(f'the prior is "rest", "current" or poses by body, but {self.prior!r} came.')
+        for given in (self.free, self.held):
+            for body in given or {}:
+                self.body_index(body)
+        twice = {c.name for c in self.contacts if sum(c.name == other.name for other in self.contacts) > 1}
+        if twice:
+            raise InvalidInput(f"contacts need unique names, but {sorted(twice)[0]!r} comes twice.")
+
+    def body_index(self, name: str) -> int:
+        """Index of a body by name; raises InvalidInput listing what exists."""
+        names = [body.name for body in self.bodies]
+        if name not in names:
+            raise InvalidInput(f"the problem has no body {name!r}; it has {', '.join(names)}.")
+        return names.index(name)
+
+    # --- dofs ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def charts(self) -> tuple[Chart, ...]:
+        """One chart per body."""
+        return tuple(Chart(body.rig, body.world_from_rig) for body in self.bodies)
+
+    @cached_property
+    def is_rigid(self) -> bool:
+        """Whether no body scales or shears, so that rotations carry normals."""
+        return all(c.is_rigid and left is None for c, left in zip(self.charts, self._leftovers, strict=True))
+
+    @cached_property
+    def free_of_body(self) -> tuple[IntArray, ...]:
+        """Per body, the indices into its chart of the dofs that may move."""
+        result = []
+        for body, chart in zip(self.bodies, self.charts, strict=True):
+            free = ~chart.locked
+            if self.free is not None:
+                free &= _named(chart, self.free.get(body.name, ()))
+            if self.held is not None:
+                free &= ~_named(chart, self.held.get(body.name, ()))
+            result.append(np.flatnonzero(free))
+        return tuple(result)
+
+    @cached_property
+    def dof_slices(self) -> tuple[slice, ...]:
+        """Per body, where its free dofs are in theta."""
+        ends = np.cumsum([0, *(len(free) for free in self.free_of_body)])
+        return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """(d,) names "body/joint.axis" of theta."""
+        return tuple(
+            f"{body.name}/{chart.dof_names[q]}"
+            for body, chart, free in zip(self.bodies, self.charts, self.free_of_body, strict=True)
+            for q in free
+        )
+
+    @cached_property
+    def limits_of_theta(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper (d,); translations are free, and so is the turning of a root unless its rig says."""
+        lower, upper = self._gather([c.lower for c in self.charts]), self._gather([c.upper for c in self.charts])
+        translation, root = self.is_translation, self.is_root
+        if self.limits == "none":
+            return np.full_like(lower, -np.inf), np.full_like(upper, np.inf)
+        if self.limits == "paper":
+            return np.where(translation, -np.inf, 0.0), np.where(translation, np.inf, 2.0 * np.pi)
+        inner = ~translation & ~root
+        return np.where(inner, np.maximum(lower, -np.pi), lower), np.where(inner, np.minimum(upper, np.pi), upper)
+
+    @cached_property
+    def is_translation(self) -> BoolArray:
+        """(d,) which dofs are lengths rather than angles."""
+        return self._gather([c.is_translation for c in self.charts]).astype(bool)
+
+    @cached_property
+    def is_root(self) -> BoolArray:
+        """(d,) which dofs place a whole body."""
+        return self._gather([c.is_root for c in self.charts]).astype(bool)
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """(d,) natural size of each dof: 1 radian, or the manipulator's length."""
+        return np.where(self.is_translation, self.manipulator_length, 1.0)
+
+    @cached_property
+    def prior_weights(self) -> FloatArray:
+        """(d,) the rigs' prior weights; 0 for dofs that place a whole body (the paper's first modification)."""
+        return np.where(self.is_root, 0.0, self._gather([c.prior_weight for c in self.charts]))
+
+    def _gather(self, per_body: Sequence[FloatArray | BoolArray]) -> FloatArray:
+        """(d,) the free entries of per-body dof arrays."""
+        parts = [np.asarray(values)[free] for values, free in zip(per_body, self.free_of_body, strict=True)]
+        return np.concatenate(parts).astype(np.float64)
+
+    # --- poses --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _charted(self) -> tuple[tuple[FloatArray, FloatArray | None], ...]:
+        return tuple(chart.theta_of(body.pose) for body, chart in zip(self.bodies, self.charts, strict=True))
+
+    @cached_property
+    def _leftovers(self) -> tuple[FloatArray | None, ...]:
+        return tuple(leftover for _, leftover in self._charted)
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """(d,) theta of the bodies' poses, brought into the limits."""
+        return np.clip(self._gather([theta for theta, _ in self._charted]), *self.limits_of_theta)
+
+    @cached_property
+    def start_state(self) -> PoseState:
+        """The state at the start."""
+        return self.state(self.start)
+
+    @cached_property
+    def prior_theta(self) -> FloatArray:
+        """(d,) where the prior pulls to."""
+        if self.prior == "rest":
+            return np.zeros(len(self.start))
+        if self.prior == "current":
+            return self.start
+        for name in self.prior:
+            self.body_index(name)
+        thetas = [
+            chart.theta_of(self.prior[body.name])[0] if body.name in self.prior else np.zeros(chart.size)
+            for body, chart in zip(self.bodies, self.charts, strict=True)
+        ]
+        return self._gather(thetas)
+
+    def full_theta(self, index: int, theta: FloatArray) -> FloatArray:
+        """All dofs of one body: the free ones from theta (d,), the others as they stand."""
+        full = self._charted[index][0].copy()
+        full[self.free_of_body[index]] = theta[self.dof_slices[index]]
+        return full
+
+    def poses(self, theta: FloatArray) -> dict[str, Pose]:
+        """The pose of every body at theta (d,)."""
+        return {
+            body.name: Pose(body.rig.joints, self.charts[i].local(self.full_theta(i, theta), self._leftovers[i]))
+            for i, body in enumerate(self.bodies)
+        }
+
+    def theta_of(self, poses: Mapping[str, Pose]) -> FloatArray:
+        """(d,) theta of poses by body, within the limits; bodies not named stay where they start."""
+        thetas = [
+            chart.theta_of(poses[body.name])[0] if body.name in poses else charted[0]
+            for body, chart, charted in zip(self.bodies, self.charts, self._charted, strict=True)
+        ]
+        return np.clip(self._gather(thetas), *self.limits_of_theta)
+
+    def at(self, theta: FloatArray) -> PoseProblem:
+        """The same problem starting at theta (d,)."""
+        poses = self.poses(theta)
+        return replace(self, bodies=tuple(replace(body, pose=poses[body.name]) for body in self.bodies))
+
+    # --- evaluation ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def manipulator_length(self) -> float:
+        """Largest rest extent of the skin that the free joints drive, world units (over all bodies)."""
+        if self.length is not None:
+            return float(self.length)
+        lengths = [
+            manipulator_length(body.rig, self._driven(index)) * _scale(body.world_from_rig)
+            for index, body in enumerate(self.bodies)
+            if len(self.free_of_body[index]) and len(body.rig.joints) > 1
+        ]
+        if not lengths:  # only rigid things move
+            lengths = [
+                manipulator_length(body.rig) * _scale(body.world_from_rig)
+                for index, body in enumerate(self.bodies)
+                if len(self.free_of_body[index])
+            ]
+        return max(lengths, default=1.0) or 1.0
+
+    def _driven(self, index: int) -> IntArray:
+        """Joints that the free dofs of a body move, and where several chains hang from one joint, that joint."""
+        chart = self.charts[index]
+        driven: BoolArray = np.any(chart.moves[self.free_of_body[index]], axis=0)
+        parents = chart.rig.parents[driven]
+        tops = parents[(parents >= 0) & ~driven[parents]]
+        shared, count = np.unique(tops, return_counts=True)
+        driven[shared[count > 1]] = True
+        return np.flatnonzero(driven)
+
+    @cached_property
+    def unit(self) -> float:
+        """l: the length that distances are measured in, a centimetre on an 18 cm hand."""
+        return self.manipulator_length / 18.0
+
+    @cached_property
+    def bone_offsets(self) -> IntArray:
+        """(bodies + 1,) the first bone column of each body."""
+        return np.cumsum([0, *(len(body.rig.joints) for body in self.bodies)])
+
+    @cached_property
+    def moves(self) -> FloatArray:
+        """(d, j) 1 where a free dof moves a bone (over all bodies), else 0."""
+        result = np.zeros((len(self.dof_names), int(self.bone_offsets[-1])))
+        for i, chart in enumerate(self.charts):
+            columns = slice(int(self.bone_offsets[i]), int(self.bone_offsets[i + 1]))
+            result[self.dof_slices[i], columns] = chart.moves[self.free_of_body[i]]
+        return result
+
+    @cached_property
+    def pairs(self) -> Pairs:
+        """The contact pairs as tracks."""
+        if not self.contacts:
+            raise InvalidInput("the problem has no contacts; pair at least one patch before solving.")
+        gaps, first, second, rows, row = [], [], [], {}, 0
+        for contact in self.contacts:
+            a, b = self.body_index(contact.manipulator), self.body_index(contact.object)
+            ends = ((self.bodies[a].rig, contact.manipulator_points, int(self.bone_offsets[a])),
+                    (self.bodies[b].rig, contact.object_points, int(self.bone_offsets[b])))  # fmt: skip
+            gaps.append(point_track(*ends[0]).combined(point_track(*ends[1]), -1.0))
+            first.append(normal_track(*ends[0]))
+            second.append(normal_track(*ends[1]))
+            rows[contact.name] = slice(row, row + len(contact.manipulator_points))
+            row += len(contact.manipulator_points)
+        weights = np.concatenate([np.asarray(contact.weights) for contact in self.contacts])
+        if weights.sum() <= 0.0:
+            raise InvalidInput("all contact weights are zero; give at least one point a weight.")
+        return Pairs(
+            Track.stacked(gaps), Track.stacked(first), Track.stacked(second), weights / weights.sum(), rows
+        )
+
+    @cached_property
+    def bound_terms(self) -> dict[str, BoundTerm]:
+        """The terms made ready, by name."""
+        if len({term.name for term in self.terms}) != len(self.terms):
+            raise InvalidInput(f"terms need unique names, but got {[term.name for term in self.terms]}.")
+        return {term.name: term.bind(self) for term in self.terms}
+
+    @cached_property
+    def _still(self) -> dict[int, Motion]:
+        """Motions of the bodies that do not move."""
+        return {
+            i: chart.motion(self._charted[i][0], self._leftovers[i])
+            for i, chart in enumerate(self.charts)
+            if not len(self.free_of_body[i])
+        }
+
+    def motions(self, theta: FloatArray) -> tuple[Motion, ...]:
+        """The motion of every body at theta (d,)."""
+        return tuple(
+            self._still[i] if i in self._still else chart.motion(self.full_theta(i, theta), self._leftovers[i])
+            for i, chart in enumerate(self.charts)
+        )
+
+    def state(self, theta: FloatArray) -> PoseState:
+        """All bodies at theta (d,)."""
+        return PoseState(self, theta)
+
+    def term_values(self, state: PoseState) -> dict[str, float]:
+        """Weighted value of every term."""
+        return {name: term.value(state) for name, term in self.bound_terms.items()}
+
+    def value(self, state: PoseState) -> float:
+        """The objective."""
+        return sum(term.value(state) for term in self.bound_terms.values())
+
+    def gradient(self, state: PoseState) -> FloatArray:
+        """(d,) its derivative."""
+        return sum((term.gradient(state) for term in self.bound_terms.values()), np.zeros(len(state.theta)))
+
+    def normal_matrix(self, state: PoseState) -> FloatArray:
+        """(d, d) the Gauss-Newton model of its second derivative."""
+        d = len(state.theta)
+        return sum((term.normal_matrix(state) for term in self.bound_terms.values()), np.zeros((d, d)))
+
+
+def _named(chart: Chart, names: Iterable[str]) -> BoolArray:
+    """(dofs,) those of the named joints, and single dofs by name."""
+    result = np.zeros(chart.size, bool)
+    for name in names:
+        if name in chart.dof_names:
+            result[chart.dof_names.index(name)] = True
+        else:
+            result |= chart.joint_of_dof == chart.rig.joint_index(name)
+    return result
+
+
+def _scale(transform: FloatArray) -> float:
+    return float(abs(np.linalg.det(transform[:3, :3])) ** (1.0 / 3.0))

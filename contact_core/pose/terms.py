@@ -1,0 +1,213 @@
+"""Terms of the pose objective: the protocol, and the three terms of the paper (eq. 3).
+
+A term is a few lines: `bind` makes once per problem what does not change during a solve, and answers
+something that gives value, gradient and Gauss-Newton matrix at a state. A term that is a sum of squares can
+subclass `LeastSquares` and give residuals and their Jacobian only.
+
+Scale: distances are in units of l = manipulator length / 18 (1 cm on an 18 cm hand), contact points weigh
+a_i / A, and the prior is divided by N_ref = 800, so the weights 1, 1, 10 keep the paper's meaning at any
+scale and density.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+
+from contact_core.arrays import FloatArray
+from contact_core.pose.state import PoseState
+
+if TYPE_CHECKING:
+    from contact_core.pose.problem import PoseProblem
+
+REFERENCE_COUNT = 800.0  # the paper's typical number of contact points
+SMALLEST_DISTANCE = 1e-3  # in l: where reweighting stops sharpening |d|
+
+
+class BoundTerm(Protocol):
+    """A term made ready for one problem. The term's weight is already inside."""
+
+    def value(self, state: PoseState) -> float: ...
+
+    def gradient(self, state: PoseState) -> FloatArray:
+        """(d,) exact derivative of `value`."""
+        ...
+
+    def normal_matrix(self, state: PoseState) -> FloatArray:
+        """(d, d) positive semidefinite model of the second derivative (Gauss-Newton or a majoriser)."""
+        ...
+
+
+@runtime_checkable
+class PoseTerm(Protocol):
+    """One term of the objective (hook `contact_pose_terms`)."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def weight(self) -> float: ...
+
+    def bind(self, problem: PoseProblem) -> BoundTerm:
+        """Make ready for one problem. Raises InvalidInput when the problem lacks what the term needs."""
+        ...
+
+
+class LeastSquares(ABC):
+    """A bound term 1/2 |r|^2 out of residuals r and their Jacobian."""
+
+    @abstractmethod
+    def residuals(self, state: PoseState) -> FloatArray:
+        """(m,)"""
+
+    @abstractmethod
+    def jacobian(self, state: PoseState) -> FloatArray:
+        """(m, d)"""
+
+    def value(self, state: PoseState) -> float:
+        r = self.residuals(state)
+        return 0.5 * float(r @ r)
+
+    def gradient(self, state: PoseState) -> FloatArray:
+        return self.residuals(state) @ self.jacobian(state)
+
+    def normal_matrix(self, state: PoseState) -> FloatArray:
+        jacobian = self.jacobian(state)
+        return jacobian.T @ jacobian
+
+
+@dataclass(frozen=True)
+class DistanceTerm:
+    """(1/A) sum a_i rho(d_i / l) over contact pairs: rho(x) = x^2 ("squares") or x ("paper")."""
+
+    weight: float = 1.0
+    name: str = "distance"
+
+    def bind(self, problem: PoseProblem) -> BoundTerm:
+        return _Squares(self, problem) if problem.form == "squares" else _Distances(self, problem)
+
+
+class _Squares:
+    """The squared form: its Gauss-Newton matrix needs one constant gram matrix, whatever the number of points."""
+
+    def __init__(self, term: DistanceTerm, problem: PoseProblem) -> None:
+        self.gap = problem.pairs.gap
+        self.factors = term.weight * problem.pairs.weights / problem.unit**2  # (k,)
+        self.gram = self.gap.gram(2.0 * self.factors)
+
+    def value(self, state: PoseState) -> float:
+        gap = state.vectors(self.gap)
+        return float(self.factors @ np.einsum("ki,ki->k", gap, gap))
+
+    def gradient(self, state: PoseState) -> FloatArray:
+        return state.pull(self.gap, 2.0 * self.factors[:, None] * state.vectors(self.gap))
+
+    def normal_matrix(self, state: PoseState) -> FloatArray:
+        return state.quadratic(self.gap, self.gram)
+
+
+class _Distances:
+    """The paper's unsquared form, with the reweighting that majorises |d| by a parabola."""
+
+    def __init__(self, term: DistanceTerm, problem: PoseProblem) -> None:
+        self.gap = problem.pairs.gap
+        self.factors = term.weight * problem.pairs.weights / problem.unit  # (k,)
+        self.smallest = SMALLEST_DISTANCE * problem.unit
+
+    def value(self, state: PoseState) -> float:
+        return float(self.factors @ np.linalg.norm(state.vectors(self.gap), axis=1))
+
+    def gradient(self, state: PoseState) -> FloatArray:
+        gap = state.vectors(self.gap)
+        length = np.linalg.norm(gap, axis=1)
+        unit = np.divide(gap, length[:, None], out=np.zeros_like(gap), where=length[:, None] > 0)
+        return state.pull(self.gap, self.factors[:, None] * unit)
+
+    def normal_matrix(self, state: PoseState) -> FloatArray:
+        length = np.linalg.norm(state.vectors(self.gap), axis=1)
+        return state.quadratic(self.gap, self.gap.gram(self.factors / np.maximum(length, self.smallest)))
+
+
+@dataclass(frozen=True)
+class NormalTerm:
+    """(1/A) sum a_i (1 + n_i . n'_i): surfaces that touch face each other. Half the square of n + n'."""
+
+    weight: float = 1.0
+    name: str = "normal"
+
+    def bind(self, problem: PoseProblem) -> BoundTerm:
+        return _Normals(self, problem)
+
+
+class _Normals:
+    def __init__(self, term: NormalTerm, problem: PoseProblem) -> None:
+        self.first, self.second = problem.pairs.manipulator_normals, problem.pairs.object_normals
+        self.factors = term.weight * problem.pairs.weights  # (k,)
+        # Lengths change little where skin bends and not at all elsewhere: as of the start, they keep the
+        # Gauss-Newton matrix constant in the bones. Value and gradient are exact.
+        start = problem.start_state
+        scaled = [t.scaled(1.0 / _lengths(start.vectors(t))) for t in (self.first, self.second)]
+        self.sum = scaled[0].combined(scaled[1])
+        self.gram = self.sum.gram(self.factors)
+
+    def value(self, state: PoseState) -> float:
+        first, second = state.vectors(self.first), state.vectors(self.second)
+        cosine = np.einsum("ki,ki->k", first, second) / (_lengths(first) * _lengths(second))
+        return float(self.factors @ (1.0 + cosine))
+
+    def gradient(self, state: PoseState) -> FloatArray:
+        first, second = state.vectors(self.first), state.vectors(self.second)
+        a, b = _lengths(first)[:, None], _lengths(second)[:, None]
+        u, v = first / a, second / b
+        cosine = np.einsum("ki,ki->k", u, v)[:, None]
+        w = self.factors[:, None]
+        return state.pull(self.first, w * (v - cosine * u) / a) + state.pull(self.second, w * (u - cosine * v) / b)
+
+    def normal_matrix(self, state: PoseState) -> FloatArray:
+        return state.quadratic(self.sum, self.gram)
+
+
+def _lengths(vectors: FloatArray) -> FloatArray:
+    """(k,) lengths, 1 where a vector vanishes (a normal of a degenerate face pulls nowhere)."""
+    length = np.sqrt(np.einsum("ki,ki->k", vectors, vectors))
+    return np.where(length > 1e-12, length, 1.0)
+
+
+@dataclass(frozen=True)
+class PriorTerm:
+    """(1/N_ref) sum_j w_j rho(theta_j - prior_j) over the dofs that do not place the whole manipulator."""
+
+    weight: float = 10.0
+    name: str = "prior"
+
+    def bind(self, problem: PoseProblem) -> BoundTerm:
+        return _Prior(self, problem)
+
+
+class _Prior:
+    def __init__(self, term: PriorTerm, problem: PoseProblem) -> None:
+        self.prior = problem.prior_theta
+        self.factors = term.weight / REFERENCE_COUNT * problem.prior_weights  # (d,)
+        self.squares = problem.form == "squares"
+
+    def value(self, state: PoseState) -> float:
+        away = state.theta - self.prior
+        return float(self.factors @ (away * away if self.squares else np.abs(away)))
+
+    def gradient(self, state: PoseState) -> FloatArray:
+        away = state.theta - self.prior
+        return self.factors * (2.0 * away if self.squares else np.sign(away))
+
+    def normal_matrix(self, state: PoseState) -> FloatArray:
+        if self.squares:
+            return np.diag(2.0 * self.factors)
+        return np.diag(self.factors / np.maximum(np.abs(state.theta - self.prior), SMALLEST_DISTANCE))
+
+
+def paper_terms(distance: float = 1.0, normal: float = 1.0, prior: float = 10.0) -> tuple[PoseTerm, ...]:
+    """The objective of the paper with its weights; a weight of 0 leaves the term out."""
+    terms = (DistanceTerm(distance), NormalTerm(normal), PriorTerm(prior))
+    return tuple(term for term in terms if term.weight > 0.0)

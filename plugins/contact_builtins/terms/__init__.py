@@ -1,0 +1,1 @@
+"""Terms of the pose objective. The paper's three live in `contact_core.pose.terms`."""
