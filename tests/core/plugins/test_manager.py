@@ -1,0 +1,255 @@
+"""The manager bears every broken plugin: the program goes on and the record names the plugin and the reason."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from contact_core.errors import InvalidInput
+from contact_core.plugins import hookimpl
+from contact_core.plugins.manager import PluginManager, PluginRecord
+from contact_core.plugins.registry import CLI, PLACERS, SLOTS
+
+
+class Named:
+    """A sound placer."""
+
+    def __init__(self, name: str, replaces: str | tuple[str, ...] = ()) -> None:
+        self.name = name
+        self.replaces = replaces
+
+    def place(self, request: Any) -> Any:
+        return request
+
+
+def plugin(*placers: object, name: str = "given", **attributes: Any) -> ModuleType:
+    """A plugin module that offers these placers."""
+    module = ModuleType(name)
+    module.contact_placers = hookimpl(_returning(list(placers)))  # type: ignore[attr-defined]
+    for key, value in attributes.items():
+        setattr(module, key, value)
+    return module
+
+
+def _returning(value: Any) -> Any:
+    def contact_placers() -> Any:
+        return value
+
+    return contact_placers
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Install a distribution `name` whose one module holds `source`, as its entry point."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def write(name: str, source: str, *, entry: str | None = None) -> None:
+        (tmp_path / f"{name}.py").write_text(source, encoding="utf-8")
+        info = tmp_path / f"{name}-2.1.dist-info"
+        info.mkdir()
+        info.joinpath("METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 2.1\n")
+        info.joinpath("entry_points.txt").write_text(f"[contact_core.plugins]\n{name} = {entry or name}\n")
+
+    return write
+
+
+def record_of(manager: PluginManager, name: str) -> PluginRecord:
+    manager.fill_all()
+    return next(record for record in manager.records() if record.name == name)
+
+
+OFFER = """
+from contact_core.plugins import hookimpl
+class Mine:
+    name = "mine"
+    def place(self, request): return request
+"""
+
+BROKEN = {
+    "import_error": ("import no_such_module_anywhere\n", "No module named 'no_such_module_anywhere'"),
+    "syntax_error": ("def (:\n", "cannot be imported: SyntaxError"),
+    "exits": ("import sys; sys.exit(3)\n", "cannot be imported: SystemExit: 3"),
+    "misspelt": (OFFER + "@hookimpl\ndef contact_placer(): return [Mine()]\n", "did you mean contact_placers?"),
+    "unmarked": (OFFER + "def contact_placers(): return [Mine()]\n", "not marked with @hookimpl"),
+    "wrapper": (OFFER + "@hookimpl(wrapper=True)\ndef contact_placers():\n    yield\n", "wrappers are not called"),
+    "argument": (OFFER + "@hookimpl\ndef contact_placers(scene): return []\n", "'scene'"),
+    "raises": (OFFER + "@hookimpl\ndef contact_placers(): raise RuntimeError('boom')\n", "RuntimeError: boom"),
+    "no_list": (
+        OFFER + "@hookimpl\ndef contact_placers(): return 7\n",
+        "must return an iterable, but returned int",
+    ),
+    "wrong_type": (OFFER + "@hookimpl\ndef contact_placers(): return [object()]\n", "has no name; has no place()"),
+    "unnamed": (OFFER + "Mine.name = ''\n@hookimpl\ndef contact_placers(): return [Mine]\n", "a non-empty string"),
+    "signature": (
+        OFFER + "Mine.place = lambda self: 0\n@hookimpl\ndef contact_placers(): return [Mine]\n",
+        "cannot be called as place(request)",
+    ),
+    "constructor": (
+        OFFER + "Mine.__init__ = lambda self, size: None\n@hookimpl\ndef contact_placers(): return [Mine]\n",
+        "cannot be made: TypeError",
+    ),
+    "reference": (OFFER + "@hookimpl\ndef contact_placers(): return ['reference:Mein']\n", "it has Mine"),
+    "spelling": (OFFER + "@hookimpl\ndef contact_placers(): return ['reference.Mine']\n", "package.module:Name"),
+    "future": (OFFER + "CONTACT_API = '>=2.0'\n@hookimpl\ndef contact_placers(): return [Mine]\n", "API >=2.0"),
+    "range": (OFFER + "CONTACT_API = 'new'\n@hookimpl\ndef contact_placers(): return [Mine]\n", '">=1.0,<2"'),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_distribution_is_named_and_stops_nobody(install: Any, name: str) -> None:
+    source, complaint = BROKEN[name]
+    install(name, source)
+    install("zz_sound", OFFER.replace('"mine"', '"sound"') + "@hookimpl\ndef contact_placers(): return [Mine]\n")
+    manager = PluginManager(environ={})
+    record = record_of(manager, name)
+    assert record.source == f"{name} 2.1" or record.source == f"{name.replace('_', '-')} 2.1"
+    assert complaint in " ".join(record.problems), record.problems
+    assert not record.offers
+    assert "sound" in manager.offers(PLACERS)
+    assert not record_of(manager, "zz_sound").problems
+
+
+def test_what_a_generator_gave_before_it_raised_stays() -> None:
+    def contact_placers() -> Iterator[object]:
+        yield Named("early")
+        raise RuntimeError("late")
+
+    source = ModuleType("half")
+    source.contact_placers = hookimpl(contact_placers)  # type: ignore[attr-defined]
+    manager = PluginManager(discover=False)
+    with pytest.raises(InvalidInput, match="RuntimeError: late"):
+        manager.register(source)
+    assert not manager.records()
+
+
+def test_duplicate_names_are_refused_naming_both(install: Any) -> None:
+    hook = "@hookimpl\ndef contact_placers(): return [Mine]\n"
+    install("first_one", OFFER + hook)
+    install("second_one", OFFER + hook)
+    manager = PluginManager(environ={})
+    problems = " ".join(record_of(manager, "second_one").problems)
+    assert "'first_one' (first-one 2.1)" in problems and 'replaces = "mine"' in problems
+    assert not record_of(manager, "first_one").problems
+    assert type(manager.get(PLACERS, "mine")).__module__ == "first_one"
+
+
+def test_replaces_takes_the_place_and_the_name() -> None:
+    base = plugin(Named("plain"), Named("other"), name="base")
+    manager = PluginManager([base], discover=False)
+    dispose = manager.register(plugin(Named("better", replaces="plain"), name="over"))
+    assert manager.get(PLACERS, "plain").name == "better" and manager.get(PLACERS, "other").name == "other"
+    dispose()
+    assert manager.get(PLACERS, "plain").name == "plain" and "better" not in manager.offers(PLACERS)
+
+
+def test_replaces_may_be_said_when_registering() -> None:
+    manager = PluginManager([plugin(Named("plain"), name="base")], discover=False)
+    new = Named("plain")
+    with pytest.raises(InvalidInput, match="offers one of that name already"):
+        manager.register(plugin(new, name="refused"))
+    assert [record.name for record in manager.records()] == ["base"]
+    manager.register(plugin(new, name="over"), replaces=["plain"])
+    assert manager.get(PLACERS, "plain") is new
+
+
+def test_precedence_session_environment_entry_point_built_in(install: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    hook = "Mine.replaces = 'mine'\nMine.origin = __name__\n@hookimpl\ndef contact_placers(): return [Mine]\n"
+    install("by_entry", OFFER + hook)
+    install("by_variable", OFFER + hook, entry="no_such_entry_module")
+    manager = PluginManager(environ={"CONTACT_PLUGINS": "by_variable"})
+    origins = [record.origin for record in manager.records()]
+    assert origins == sorted(origins, key=["built-in", "entry point", "environment", "session"].index)
+    assert {"built-in", "entry point", "environment"} <= set(origins)
+    assert manager.get(PLACERS, "mine").origin == "by_variable"  # type: ignore[attr-defined]
+    session = Named("mine", replaces="mine")
+    manager.register(plugin(session, name="here"))
+    assert manager.get(PLACERS, "mine") is session
+
+
+def test_the_variable_leaves_plugins_out_and_names_failures() -> None:
+    manager = PluginManager(environ={"CONTACT_PLUGINS": "no:builtins, no_such_module"})
+    names = [record.name for record in manager.records()]
+    assert "builtins" not in names
+    assert record_of(manager, "no_such_module").source == "CONTACT_PLUGINS=no_such_module"
+    assert record_of(manager, "no_such_module").problems
+
+
+def test_without_discovery_only_what_is_given_is_there() -> None:
+    manager = PluginManager([plugin(Named("only"))], discover=False)
+    assert [record.name for record in manager.records()] == ["given"]
+    assert list(manager.offers(PLACERS)) == ["only"]
+
+
+def test_asking_for_what_is_not_there_lists_what_is() -> None:
+    manager = PluginManager([plugin(Named("naive"), Named("from_pose"))], discover=False)
+    with pytest.raises(InvalidInput, match=r"no placer 'form_pose'; there are: from_pose\."):
+        manager.get(PLACERS, "form_pose")
+    with pytest.raises(InvalidInput, match=r"no sub-command 'usd'; there are: none\."):
+        manager.get(CLI, "usd")
+
+
+def test_references_are_imported_only_when_their_slot_is_asked_for(install: Any) -> None:
+    install("lazy_part", OFFER)
+    install("lazy_front", OFFER + "@hookimpl\ndef contact_placers(): return ['lazy_part:Mine']\n")
+    manager = PluginManager(environ={"CONTACT_PLUGINS": "no:lazy_part"})
+    manager.offers(CLI)
+    assert "lazy_part" not in sys.modules
+    assert manager.get(PLACERS, "mine").name == "mine"
+    assert "lazy_part" in sys.modules
+
+
+def test_choosing_takes_the_first_answer_that_is_offered() -> None:
+    def choosing(name: str, answer: object) -> ModuleType:
+        def contact_choose_pose_solver(offered: Any) -> Any:
+            if isinstance(answer, Exception):
+                raise answer
+            return answer
+
+        module = ModuleType(name)
+        module.contact_choose_pose_solver = hookimpl(contact_choose_pose_solver)  # type: ignore[attr-defined]
+        return module
+
+    manager = PluginManager(
+        [choosing("low", "a"), choosing("none", None), choosing("odd", "z"), choosing("bad", ValueError("no"))],
+        discover=False,
+    )
+    assert manager.choose("contact_choose_pose_solver", ["a", "b"], problem=None) == "a"
+    problems = {record.name: record.problems for record in manager.records()}
+    assert "chose 'z', which is not among a, b" in problems["odd"][0]
+    assert "raised ValueError: no" in problems["bad"][0]
+    manager.register(choosing("high", "b"))
+    assert manager.choose("contact_choose_pose_solver", ["a", "b"], problem=None) == "b"
+    assert PluginManager(discover=False).choose("contact_choose_pose_solver", ["a"], problem=None) is None
+
+
+def test_telling_reaches_everybody_even_past_one_that_raises() -> None:
+    heard: list[tuple[str, int]] = []
+
+    def listening(name: str, fails: bool) -> ModuleType:
+        def contact_document_changed(revision: int) -> None:
+            if fails:
+                raise RuntimeError("deaf")
+            heard.append((name, revision))
+
+        module = ModuleType(name)
+        module.contact_document_changed = hookimpl(contact_document_changed)  # type: ignore[attr-defined]
+        return module
+
+    manager = PluginManager([listening("a", False), listening("b", True), listening("c", False)], discover=False)
+    for revision in (1, 2):
+        manager.notify("contact_document_changed", document=None, revision=revision, origin="test")
+    assert heard == [("a", 1), ("c", 1), ("a", 2), ("c", 2)]
+    assert record_of(manager, "b").problems == ["its hook contact_document_changed raised RuntimeError: deaf."]
+
+
+def test_the_built_ins_have_no_problem_and_fill_every_slot_that_is_theirs() -> None:
+    manager = PluginManager(environ={})
+    record = record_of(manager, "builtins")
+    assert record.origin == "built-in" and record.problems == []
+    wanted = {slot.noun for slot in SLOTS} - {"host"}
+    assert wanted <= {noun for each in manager.records() if each.origin == "built-in" for noun in each.offers}
