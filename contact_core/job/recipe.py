@@ -275,7 +275,7 @@ def _patch(table: Table, name: str, joint: str | None) -> PatchSpec:
         inner = table.table("disk")
         disk = DiskSpec(
             at=_point(inner, joint, done=False),
-            radius=inner.number("radius", above=0.0, at_most=1e9),
+            radius=inner.number("radius", above=0.0),
             count=inner.count("points", 80, at_least=3, at_most=20_000),
         )
         inner.done()

@@ -1,0 +1,108 @@
+# ruff: noqa: E501  (a table of mistakes reads best in one row each)
+"""Recipes: strict, and every mistake a sentence that names the file, the place and the cure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from contact_core.errors import FileRefused, InvalidInput
+from contact_core.job.recipe import ACCEPT, load_recipe, parse_recipe
+
+GOOD = """
+schema = 1
+name = "ball"
+[manipulator]
+file = "hand.glb"
+sha256 = "BC677831449400000000000000000000000000000000000000000000000000ff"
+rig = "hand.rig.toml"
+[object]
+sample = "baseball"
+solids = ["surface", "hull"]
+hull_box = { low = [-1, -1, -1], high = [1, 1, 1] }
+[coarse]
+object_center = [0, 0.1, 0]
+pose = { "index*" = [0, 0, 30], "thumb-1" = 20 }
+[placer]
+name = "from pose"
+approach = [1, 0, 0]
+close = ["index*"]
+[[patch]]
+name = "{joint} pad"
+joints = ["index-tip", "thumb-tip"]
+disk = { along = 0.6, radius = 0.007, points = 40 }
+[[patch]]
+name = "palm"
+vertices = [1, 2, 3]
+axis = { through = [{ vertex = 1 }, { position = [0, 0, 1] }] }
+place = { root = { vertex = 7 }, aim = { position = [0, 1, 0] } }
+[accept]
+gap = 0.01
+"""
+
+
+def test_a_recipe_says_what_it_says() -> None:
+    recipe = parse_recipe(GOOD, name="ball.toml")
+    assert [patch.name for patch in recipe.patches] == ["index-tip pad", "thumb-tip pad", "palm"]
+    tip, _, palm = recipe.patches
+    assert tip.disk is not None and tip.disk.at.joint == "index-tip" and tip.disk.at.along == 0.6
+    assert tip.disk.count == 40 and tip.generator == "along the bone" and tip.place is None
+    assert palm.vertices == (1, 2, 3) and palm.axis[1].position == (0.0, 0.0, 1.0)
+    assert palm.place is not None and palm.place.aim is not None and palm.place.root.vertex == 7
+    assert recipe.manipulator.sha256 is not None and recipe.manipulator.sha256.startswith("bc67")
+    assert recipe.coarse.pose == {"index*": (0.0, 0.0, 30.0), "thumb-1": (20.0,)}
+    assert recipe.placer_options == {"approach": [1, 0, 0], "close": ["index*"]}
+    assert recipe.accept == {"gap": 0.01} and set(recipe.accept) <= set(ACCEPT)
+    assert recipe.object.solids == ("surface", "hull") and recipe.object.fill_high == (1.0, 1.0, 1.0)
+
+
+MISTAKES = {
+    "no schema": ("schema = 1", "", r"recipe needs 'schema'"),
+    "a newer schema": ("schema = 1", "schema = 7", r"schema 7; this contact-core reads up to 1. Update"),
+    "a misspelt key": ("object_center", "object_centre", r"coarse has no key 'object_centre'; did you mean 'object_center'"),
+    "an unknown table": ("[accept]", "[expect]", r"recipe has no key 'expect'; it knows .*accept"),
+    "two sources": ('sample = "baseball"', 'sample = "baseball"\nfile = "b.obj"', r"exactly one of 'file', 'sample', but 'file' and 'sample' came"),
+    "no source": ('sample = "baseball"', "", r"exactly one of 'file', 'sample', but none came"),
+    "a bad digest": ("BC67", "XY67", r"sha256 must be 64 hex digits"),
+    "a word for a number": ("radius = 0.007", 'radius = "wide"', r"disk.radius must be a number above 0, but 'wide' came"),
+    "a negative radius": ("radius = 0.007", "radius = -1", r"disk.radius must be a number above 0, but -1 came"),
+    "a boolean is no number": ("radius = 0.007", "radius = true", r"a number above 0, but True came"),
+    "not a number": ("radius = 0.007", "radius = nan", r"a number above 0, but nan came"),
+    "too few points": ("points = 40", "points = 2", r"a whole number from 3 to 20000, but 2 came"),
+    "a short vector": ("object_center = [0, 0.1, 0]", "object_center = [0, 0.1]", r"three numbers, but \[0, 0.1\] came"),
+    "a zero direction": ("root = { vertex = 7 }, aim", "root = { vertex = 7 }, direction = [0,0,0], ain", r"ain|exactly one|not all zero"),
+    "both ways to head": ("root = { vertex = 7 },", "root = { vertex = 7 }, direction = [1,0,0],", r"exactly one of 'direction', 'aim'"),
+    "no place for the joint's name": ('"{joint} pad"', '"pad"', r"must hold \{joint\}"),
+    "the same name twice": ('name = "palm"', 'name = "thumb-tip pad"', r"unique, but 'thumb-tip pad' comes twice"),
+    "an unknown solid": ('"hull"]', '"inside"]', r"'surface' and 'hull', but 'inside' came"),
+    "an unknown threshold": ("gap = 0.01", "gaps = 0.01", r"accept has no key 'gaps'; did you mean 'gap'"),
+    "an axis of one point": ("{ vertex = 1 }, { position = [0, 0, 1] }", "{ vertex = 1 }", r"at least two points"),
+    "patches that are no list": ('[[patch]]\nname = "{joint} pad"', '[patch]\nname = "{joint} pad"', r"is not TOML"),
+    "points twice": ("vertices = [1, 2, 3]", "vertices = [1, 2, 3]\npositions = [[0,0,0]]", r"exactly one of 'vertices', 'positions', 'disk'"),
+    "a fraction as a vertex": ("vertices = [1, 2, 3]", "vertices = [1.5]", r"a list of whole numbers"),
+    "too many angles": ('"thumb-1" = 20', '"thumb-1" = [1,2,3,4]', r"one to three angles"),
+    "not TOML": ("[accept]", "[accept", r"is not TOML"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_each_mistake_is_a_sentence_with_the_files_name(mistake: str) -> None:
+    right, wrong, says = MISTAKES[mistake]
+    assert GOOD.count(right) >= 1
+    with pytest.raises(InvalidInput, match=says) as caught:
+        parse_recipe(GOOD.replace(right, wrong, 1), name="ball.toml")
+    assert str(caught.value).startswith("ball.toml")
+
+
+def test_files_that_are_no_recipes(tmp_path: Path) -> None:
+    with pytest.raises(FileRefused, match=r"cannot read the recipe .*none.toml"):
+        load_recipe(tmp_path / "none.toml")
+    binary = tmp_path / "picture.toml"
+    binary.write_bytes(b"\x89PNG\xff\xfe")
+    with pytest.raises(FileRefused, match="not UTF-8"):
+        load_recipe(binary)
+    large = tmp_path / "large.toml"
+    large.write_bytes(b"#" * 5_000_000)
+    with pytest.raises(FileRefused, match="too large"):
+        load_recipe(large)
