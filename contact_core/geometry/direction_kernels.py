@@ -1,0 +1,142 @@
+"""Kernels between directions in space and headings on the surface."""
+
+from __future__ import annotations
+
+import math
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.jit import kernel
+from contact_core.geometry.tangent_kernels import (
+    ON_EDGE,
+    ON_FACE,
+    PI,
+    corner_angle,
+    corner_at_angle,
+    place,
+    turned,
+    vertex_scale,
+)
+from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, preceding
+
+
+@kernel
+def in_frame(h: int, dx: float, dy: float, dz: float, points: FloatArray, faces: IntArray) -> tuple[float, float]:
+    """A direction in space projected into the frame of halfedge h (not normalised)."""
+    f, k = h // 3, h % 3
+    a, b, c = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
+    ex, ey, ez = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+    wx, wy, wz = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
+    length = math.sqrt(ex * ex + ey * ey + ez * ez)
+    ex, ey, ez = ex / length, ey / length, ez / length
+    along = ex * wx + ey * wy + ez * wz
+    wx, wy, wz = wx - along * ex, wy - along * ey, wz - along * ez
+    height = math.sqrt(wx * wx + wy * wy + wz * wz)
+    x = dx * ex + dy * ey + dz * ez
+    return x, (dx * wx + dy * wy + dz * wz) / height if height > 0.0 else 0.0
+
+
+@kernel
+def in_space(h: int, x: float, y: float, points: FloatArray, faces: IntArray, direction: FloatArray) -> None:
+    """Write the unit direction in space (3,) of direction (x, y) in the frame of halfedge h."""
+    f, k = h // 3, h % 3
+    a, b, c = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
+    ee = ew = ww = 0.0
+    for i in range(3):
+        e, w = points[b, i] - points[a, i], points[c, i] - points[a, i]
+        ee, ew, ww = ee + e * e, ew + e * w, ww + w * w
+    length = math.sqrt(ee)
+    height = math.sqrt(max(ww - ew * ew / ee, 0.0))
+    norm = 0.0
+    for i in range(3):
+        e, w = points[b, i] - points[a, i], points[c, i] - points[a, i]
+        up = (w - ew / ee * e) / height if height > 0.0 else 0.0
+        direction[i] = x * e / length + y * up
+        norm += direction[i] * direction[i]
+    norm = math.sqrt(norm)
+    for i in range(3):
+        direction[i] /= norm
+
+
+@kernel
+def headings_of_directions(
+    points: FloatArray,
+    faces: IntArray,
+    at_faces: IntArray,
+    at_barycentric: FloatArray,
+    directions: FloatArray,
+    tail: IntArray,
+    twin: IntArray,
+    shape: FloatArray,
+    first: IntArray,
+    angle_sum: FloatArray,
+    kind: IntArray,
+    headings: FloatArray,
+) -> None:
+    """Write headings (k, 2) of directions (k, 3) at points: see `tangent.direction_to_heading`."""
+    for i in range(len(at_faces)):
+        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
+        b = at_barycentric[i]
+        on, element, _, _ = place(at_faces[i], b[0], b[1], b[2], tail, twin, shape)
+        if on == ON_FACE:
+            x, y = in_frame(3 * element, dx, dy, dz, points, faces)
+        elif on == ON_EDGE:
+            x, y = in_frame(element, dx, dy, dz, points, faces)
+            if twin[element] >= 0:
+                _, beyond = in_frame(twin[element], dx, dy, dz, points, faces)
+                y = y if y >= beyond else -beyond
+            else:
+                y = max(y, 0.0)
+        else:
+            best, angle = -2.0, 0.0
+            h = first[element]
+            while True:
+                x, y = in_frame(h, dx, dy, dz, points, faces)
+                corner = corner_angle(h, shape)
+                half = 0.5 * corner
+                u, v = turned(x, y, math.cos(half), -math.sin(half))
+                alpha = half + min(max(math.atan2(v, u), -half), half)
+                agreement = x * math.cos(alpha) + y * math.sin(alpha)
+                if agreement > best:
+                    best, angle = agreement, shape[h, 3] + alpha
+                h = twin[preceding(h)]
+                if h < 0 or h == first[element]:
+                    break
+            angle *= vertex_scale(element, angle_sum, kind)
+            x, y = math.cos(angle), math.sin(angle)
+        length = math.hypot(x, y)
+        headings[i, 0], headings[i, 1] = (x / length, y / length) if length > 0.0 else (1.0, 0.0)
+
+
+@kernel
+def directions_of_headings(
+    points: FloatArray,
+    faces: IntArray,
+    at_faces: IntArray,
+    at_barycentric: FloatArray,
+    headings: FloatArray,
+    tail: IntArray,
+    twin: IntArray,
+    shape: FloatArray,
+    first: IntArray,
+    angle_sum: FloatArray,
+    kind: IntArray,
+    directions: FloatArray,
+) -> None:
+    """Write directions (k, 3) of headings (k, 2) at points: see `tangent.heading_to_direction`."""
+    for i in range(len(at_faces)):
+        x, y = headings[i, 0], headings[i, 1]
+        b = at_barycentric[i]
+        on, element, _, _ = place(at_faces[i], b[0], b[1], b[2], tail, twin, shape)
+        if on == ON_FACE:
+            h = 3 * element
+        elif on == ON_EDGE:
+            h = element
+            if y < 0.0 and twin[h] >= 0:
+                h, x, y = twin[h], -x, -y
+        else:
+            angle = math.atan2(y, x)
+            if angle < 0.0 and kind[element] != BOUNDARY_VERTEX:
+                angle += 2.0 * PI
+            h, angle = corner_at_angle(element, angle / vertex_scale(element, angle_sum, kind), twin, shape, first)
+            x, y = math.cos(angle), math.sin(angle)
+        in_space(h, x, y, points, faces, directions[i])
