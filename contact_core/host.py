@@ -197,6 +197,8 @@ class Display(HostAdapter, Protocol):
 
 @runtime_checkable
 class Picking(HostAdapter, Protocol):
+    viewport: tuple[int, int]  # width and height, pixels
+
     @abstractmethod
     def rays(self, pixels: Any) -> tuple[FloatArray, FloatArray]:
         """World origins (k, 3) and unit directions (k, 3) of the rays through screen positions (k, 2).

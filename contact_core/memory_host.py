@@ -55,15 +55,19 @@ class MemoryHost(
     Picking,
     Progress,
 ):
-    """A scene in memory. path: a file to open; None: an empty scene of `space`. Raises FileRefused."""
+    """A scene in memory: of the file at `path`, or `scene`, or empty of `space`. Raises FileRefused."""
 
     name = "memory"
     suffixes = (".contactscene",)
     viewport = (1280, 720)  # pixels
 
-    def __init__(self, path: Path | str | None = None, *, space: SceneSpace | None = None) -> None:
+    def __init__(
+        self, path: Path | str | None = None, *, scene: MemoryScene | None = None, space: SceneSpace | None = None
+    ) -> None:
         self._path = None if path is None else Path(path)
-        self._scene = MemoryScene(space or SceneSpace(1.0, "Y")) if self._path is None else load_scene(self._path)
+        self._scene = scene or MemoryScene(space or SceneSpace(1.0, "Y"))
+        if self._path is not None:
+            self._scene = load_scene(self._path)
         self._states: list[tuple[str, MemoryScene]] = [("open", self._scene)]  # the scene after each step
         self._at = 0
         self._depth = 0  # of open steps
@@ -71,6 +75,11 @@ class MemoryHost(
         self.picture: Picture | None = None
         self.told: list[tuple[float, str]] = []  # progress so far
         self.cancel_asked = False
+
+    @property
+    def scene(self) -> MemoryScene:
+        """The scene as it stands: a value that later edits do not change."""
+        return self._scene
 
     def space(self) -> SceneSpace:
         return self._scene.space
