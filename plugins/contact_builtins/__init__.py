@@ -40,12 +40,16 @@ def contact_pose_terms() -> list[object]:
         "contact_core.pose.terms:DistanceTerm",
         "contact_core.pose.terms:NormalTerm",
         "contact_core.pose.terms:PriorTerm",
+        "contact_builtins.terms.penetration:PenetrationTerm",
     ]
 
 
 @hookimpl
 def contact_geodesic_engines() -> list[object]:
-    return []
+    return [
+        "contact_core.geometry.engine:ExactEngine",
+        "contact_builtins.engines.vector_heat:VectorHeatEngine",
+    ]
 
 
 @hookimpl

@@ -1,0 +1,1 @@
+"""Geodesic engines beside the exact one of the core."""
