@@ -52,7 +52,7 @@ def approach(hand: HandPose, direction: FloatArray, without: IntArray) -> None:
     )
 
 
-def close(hand: HandPose, digit: Sequence[int], step: float = STEP) -> None:
+def close(hand: HandPose, digit: Sequence[int] | IntArray, step: float = STEP) -> None:
     """Curl the joints of one digit (root to tip) until they touch or reach their limits."""
     chain = [(joint, dof) for joint in digit if (dof := flexion_dof(hand.chart, joint)) is not None]
     if not chain:
@@ -73,12 +73,12 @@ def close(hand: HandPose, digit: Sequence[int], step: float = STEP) -> None:
         moving &= hand.theta[dofs] > before
 
 
-def search_thumb(hand: HandPose, digit: Sequence[int], pads: Sequence[SurfacePoints]) -> None:
+def search_thumb(hand: HandPose, digit: Sequence[int] | IntArray, pads: Sequence[SurfacePoints]) -> None:
     """Try starts of the thumb's first joint, close each, keep the one whose pads lie best on the object.
 
     pads: points that should touch; the thumb's last link where there are none.
     """
-    first, rest = digit[0], list(digit[1:])
+    first, rest = int(digit[0]), list(digit[1:])
     where = hand.chart.rotation_slices[first]
     lower, upper = (
         np.where(np.isfinite(b), b, s * np.pi / 4)
@@ -98,7 +98,7 @@ def search_thumb(hand: HandPose, digit: Sequence[int], pads: Sequence[SurfacePoi
         hand.theta = best[1]
 
 
-def _misfit(hand: HandPose, digit: Sequence[int], pads: Sequence[SurfacePoints]) -> float:
+def _misfit(hand: HandPose, digit: Sequence[int] | IntArray, pads: Sequence[SurfacePoints]) -> float:
     """How badly pads lie: mean distance, turned-away normals, and skin of the digit that is inside."""
     length = hand.rig.surface.bounding_box_diagonal
     skin = hand.skin()

@@ -1,0 +1,121 @@
+"""Finding and reading what a recipe names: files by name and sha256, built-in samples, sidecars."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from contact_core.document.asset import Asset
+from contact_core.errors import FileRefused, InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.job.recipe import AssetSource, ObjectSpec
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import FORMATS, SAMPLES
+
+
+def read_source(source: AssetSource, plugins: PluginManager, folder: Path | None = None) -> Asset:
+    """The asset that a recipe names. Raises FileRefused, InvalidInput."""
+    if source.sample is not None:
+        return plugins.get(SAMPLES, source.sample).build()
+    path = find_file(source, folder)
+    sidecar = None
+    if source.sidecar is not None:
+        sidecar = (folder or Path.cwd()) / source.sidecar
+        if not sidecar.is_file():
+            raise FileRefused(f"there is no rig sidecar {sidecar}; name a file that is, relative to the recipe.")
+    return read_file(path, plugins, sidecar=sidecar)
+
+
+def read_file(path: Path, plugins: PluginManager, *, sidecar: Path | None = None) -> Asset:
+    """Read a file by the format that its suffix names. Raises FileRefused."""
+    suffix = path.suffix.lower()
+    readers = [format_ for format_ in plugins.offers(FORMATS).values() if format_.can_read]
+    for reader in readers:
+        if suffix in reader.suffixes:
+            return reader.read(path, sidecar=sidecar)
+    known = ", ".join(sorted({s for reader in readers for s in reader.suffixes}))
+    raise FileRefused(f"no reader for {path.name}: {suffix or 'a name without suffix'} is none of {known}.")
+
+
+def find_file(source: AssetSource, folder: Path | None = None) -> Path:
+    """Where a recipe's file is: beside the recipe, else among the assets, by name; its sha256 is checked.
+
+    Raises FileRefused with a sentence on where to get it.
+    """
+    name = str(source.file)
+    found = next(_candidates(name, folder), None)
+    if found is None:
+        raise FileRefused(
+            f"{name} is not beside the recipe, not in $CONTACT_ASSETS and not in ../shared/assets. Set"
+            " CONTACT_ASSETS to the folder that holds it; examples/ASSETS.md says where each file comes from."
+        )
+    if source.sha256 is not None:
+        try:
+            digest = hashlib.sha256(found.read_bytes()).hexdigest()
+        except OSError as error:
+            raise FileRefused(f"cannot read {found}: {error.strerror or error}.") from error
+        if digest != source.sha256:
+            raise FileRefused(
+                f"{found} is another version of {name} than the recipe was made for: sha256 {digest[:12]}..., not"
+                f" {source.sha256[:12]}... . Get that version, or take the sha256 out of the recipe."
+            )
+    return found
+
+
+def _candidates(name: str, folder: Path | None) -> Iterator[Path]:
+    """Files of that name or path, the nearest first."""
+    here = folder or Path.cwd()
+    if (here / name).is_file():
+        yield here / name
+    places = [Path(os.environ["CONTACT_ASSETS"])] if os.environ.get("CONTACT_ASSETS") else []
+    places += [Path.cwd().parent / "shared" / "assets", here.resolve().parent.parent / "shared" / "assets"]
+    plain = Path(name).name
+    for place in places:
+        if place.is_dir() and plain == name:
+            yield from sorted(path for path in place.rglob(plain) if path.is_file())
+
+
+def object_mesh(asset: Asset, spec: ObjectSpec, meters_per_unit: float) -> TriangleMesh:
+    """The object's surface in the manipulator's units (`meters_per_unit`), the recipe's scale applied."""
+    factor = spec.scale * (1.0 if asset.meters_per_unit is None else asset.meters_per_unit / meters_per_unit)
+    return asset.mesh if factor == 1.0 else TriangleMesh(asset.mesh.points * factor, asset.mesh.faces)
+
+
+def solids_of(mesh: TriangleMesh, spec: ObjectSpec) -> tuple[TriangleMesh, ...]:
+    """The closed surfaces whose inside counts as inside the object."""
+    made = {"surface": lambda: mesh, "hull": lambda: convex_hull(mesh, spec.fill_low, spec.fill_high)}
+    return tuple(made[kind]() for kind in spec.solids)
+
+
+def convex_hull(
+    mesh: TriangleMesh,
+    low: tuple[float, float, float] | None = None,
+    high: tuple[float, float, float] | None = None,
+) -> TriangleMesh:
+    """The convex hull of the mesh's points, of those within a box where one is given: a filled proxy.
+
+    Raises InvalidInput when the box leaves too little for a hull.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = mesh.points[np.unique(mesh.faces)]
+    if low is not None:
+        points = points[(points >= np.asarray(low)).all(axis=1)]
+    if high is not None:
+        points = points[(points <= np.asarray(high)).all(axis=1)]
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise InvalidInput(f"object.hull_box leaves {len(points)} points, which span no hull; widen it.") from error
+    faces = hull.simplices.copy()
+    corners = points[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (
+        np.einsum("mi,mi->m", normal, hull.equations[:, :3]) < 0
+    )  # qhull's normals point out, its order need not
+    faces[inward] = faces[inward][:, ::-1]
+    return TriangleMesh(points, faces)
