@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
@@ -77,8 +76,8 @@ def rigid_rig(name: str, mesh: TriangleMesh, *, movable: bool) -> Rig:
 class PairedPoints:
     """One contact pair as a solver sees it: k points on one body that shall meet k points on another (or itself).
 
-    manipulator, object: names of bodies. weights: (k,) relative weight of each point, by default each point's
-    share; their sum over all pairs is what distances are averaged over.
+    manipulator, object: names of bodies. weights: (k,) relative weight of each point, by default 1 (give
+    areas where points stand for unequal ones); distances are averaged over the weights of all pairs.
     """
 
     name: str
@@ -86,7 +85,7 @@ class PairedPoints:
     manipulator_points: SurfacePoints
     object: str
     object_points: SurfacePoints
-    weights: FloatArray | None = None
+    weights: FloatArray = field(default_factory=lambda: np.ones(0))
 
     def __post_init__(self) -> None:
         k = len(self.manipulator_points)
@@ -95,18 +94,13 @@ class PairedPoints:
                 f"contact {self.name!r} pairs point by point, but has {k} points on {self.manipulator} and"
                 f" {len(self.object_points)} on {self.object}."
             )
-        given = np.ones(k) if self.weights is None else self.weights
+        given = np.ones(k) if len(self.weights) == 0 else self.weights
         weights = frozen(given, np.float64, (k,), f"weights of contact {self.name!r}")
         if (weights < 0).any():
             raise InvalidInput(
                 f"weights of contact {self.name!r} must not be negative, but {weights.min():.3g} came."
             )
         object.__setattr__(self, "weights", weights)
-
-    @cached_property
-    def total_weight(self) -> float:
-        """Sum of the weights."""
-        return float(self.weights.sum()) if self.weights is not None else 0.0
 
 
 def manipulator_length(rig: Rig, joints: IntArray | None = None) -> float:

@@ -54,7 +54,7 @@ def _race(descents: list[Descent], budget: int) -> SolveStatus:
             budget -= descent.advance(min(TRIAL_ITERATIONS, budget))
         descents.sort(key=lambda descent: descent.value)
         ceiling = WORTH_CONTINUING * descents[0].value
-        descents = [descent for descent in descents[:CONTINUED] if descent.value <= ceiling]
+        descents = descents[:1] + [other for other in descents[1:CONTINUED] if other.value <= ceiling]
     for descent in descents:
         budget -= descent.advance(budget)
     best = min(descents, key=lambda descent: descent.value)

@@ -216,9 +216,12 @@ class PoseProblem:
         return np.clip(self._gather(thetas), *self.limits_of_theta)
 
     def at(self, theta: FloatArray) -> PoseProblem:
-        """The same problem starting at theta (d,)."""
-        poses = self.poses(theta)
-        return replace(self, bodies=tuple(replace(body, pose=poses[body.name]) for body in self.bodies))
+        """The same problem, objective and all, starting at theta (d,)."""
+        poses, prior = self.poses(theta), self.prior
+        if prior == "current":
+            prior = {body.name: body.pose for body in self.bodies}
+        bodies = tuple(replace(body, pose=poses[body.name]) for body in self.bodies)
+        return replace(self, bodies=bodies, prior=prior, length=self.manipulator_length)
 
     # --- evaluation ---------------------------------------------------------------------------------------
 

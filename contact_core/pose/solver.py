@@ -206,14 +206,18 @@ class Run:
             self.best_value, self.best_theta = value, state.theta
         return state, value
 
-    def iteration(self) -> None:
-        """Report; raises Stop when the callback cancels."""
-        self.trace.append(self.best_value)
+    def iteration(self, theta: FloatArray | None = None, value: float | None = None) -> None:
+        """Report the best pose, or the pose of a stage; raises Stop when the callback cancels."""
+        self.trace.append(self.best_value if value is None else value)
         if self.progress is None:
             return
-        seconds = time.perf_counter() - self.began
         seen = Iteration(
-            len(self.trace), self.best_value, self.evaluations, seconds, self.problem, self.best_theta.copy()
+            number=len(self.trace),
+            value=self.trace[-1],
+            evaluations=self.evaluations,
+            seconds=time.perf_counter() - self.began,
+            problem=self.problem,
+            theta=(self.best_theta if theta is None else theta).copy(),
         )
         if self.progress(seen):
             raise Stop

@@ -7,7 +7,7 @@ product, and an accepted step adds the derivatives.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,7 @@ class PoseState:
         # By identity; the track is kept beside its vectors so that its id stays its own.
         self._vectors: dict[int, tuple[Track, FloatArray]] = {}
         self._derivatives: dict[tuple[int, bytes], FloatArray] = {}
+        self.memory: dict[object, Any] = {}  # what bound terms keep of this state for themselves
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:

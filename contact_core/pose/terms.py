@@ -155,8 +155,8 @@ class _Normals:
 
     def value(self, state: PoseState) -> float:
         first, second = state.vectors(self.first), state.vectors(self.second)
-        cosine = np.einsum("ki,ki->k", first, second) / (_lengths(first) * _lengths(second))
-        return float(self.factors @ (1.0 + cosine))
+        sum_of_units = first / _lengths(first)[:, None] + second / _lengths(second)[:, None]
+        return 0.5 * float(self.factors @ np.einsum("ki,ki->k", sum_of_units, sum_of_units))  # never below 0
 
     def gradient(self, state: PoseState) -> FloatArray:
         first, second = state.vectors(self.first), state.vectors(self.second)

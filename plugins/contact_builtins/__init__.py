@@ -31,6 +31,10 @@ def contact_placers() -> list[object]:
 def contact_pose_solvers() -> list[object]:
     return [
         "contact_core.pose.levenberg_marquardt:LevenbergMarquardt",
+        "contact_builtins.solvers.nlopt_solver:NLoptSolver",
+        "contact_builtins.solvers.stepwise:StagedSolver",
+        "contact_builtins.solvers.stepwise:ProgressiveSolver",
+        "contact_builtins.solvers.stepwise:MultiStartSolver",
     ]
 
 

@@ -1,0 +1,137 @@
+"""Solvers that call the default solver several times: staged, progressive, and from many starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.errors import InvalidInput
+from contact_core.pose.candidates import fitted
+from contact_core.pose.levenberg_marquardt import Descent, LevenbergMarquardt
+from contact_core.pose.problem import PoseProblem
+from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.pose.stages import Stage, solve_stages
+
+
+class StagedSolver:
+    """The paper's chair: root first, then legs and feet, then arms.
+
+    Setting `stages` (`SolveOptions.more`): a list of `Stage`s or tables with free, contacts, prior, name. Without
+    it: the roots alone on all contacts, then everything.
+    """
+
+    name = "staged"
+    summary = "Levenberg-Marquardt in stages, each with its own free joints, contacts and prior."
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        options = options or SolveOptions()
+        given = options.more.get("stages")
+        if given is not None and not isinstance(given, (list, tuple)):
+            raise InvalidInput(f"the setting stages is a list of stages, but {type(given).__name__} came.")
+        stages = [Stage.parse(stage) for stage in given] if given else [roots_first(problem), Stage(name="all")]
+        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, options, progress)
+
+
+class ProgressiveSolver:
+    """For wraps: contacts join one by one along the chain that carries them, so a tail follows its head.
+
+    Setting `steps`: how many times contacts are added (by default one joint at a time).
+    """
+
+    name = "progressive"
+    summary = "Levenberg-Marquardt with contacts added along the chain; for tentacles and long wraps."
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        options = options or SolveOptions()
+        depths = {contact.name: carrier_depths(problem, contact.name) for contact in problem.contacts}
+        levels = np.unique(np.concatenate(list(depths.values()))) if depths else np.zeros(1, np.int64)
+        steps = int(options.more.get("steps", len(levels)))
+        if steps < 1:
+            raise InvalidInput(f"the setting steps is at least 1, but {steps} came.")
+        ends = (
+            levels[np.unique(np.linspace(0, len(levels) - 1, steps + 1).astype(int)[1:])]
+            if steps > 1
+            else levels[-1:]
+        )
+        stages = [
+            Stage(
+                weights={c.name: np.where(depths[c.name] <= end, c.weights, 0.0) for c in problem.contacts},  # (k,)
+                name=f"up to joint level {end}",
+            )
+            for end in ends
+        ]
+        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, options, progress)
+
+
+class MultiStartSolver:
+    """Many seeded starts: the candidates first, then random placements and poses within the limits.
+
+    Setting `starts`: how many (32 by default), each with the iterations of `max_iterations`.
+    """
+
+    name = "multi-start"
+    summary = "Levenberg-Marquardt from many random starts; the best known objective, for benchmarks."
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        options = options or SolveOptions()
+        starts = int(options.more.get("starts", 32))
+        run = Run(self.name, problem, progress)
+        stopped = unsolvable(run)
+        if stopped is not None:
+            return stopped
+        random = np.random.default_rng(options.seed)
+        status, best = SolveStatus.STOPPED, np.inf
+        try:
+            for number in range(starts):
+                theta = problem.start if number == 0 else random_start(problem, random)
+                placed = fitted(problem, theta, with_normals=number % 2 == 0)
+                descent = Descent(run, theta if placed is None or number == 0 else placed, options.tolerance)
+                descent.advance(options.max_iterations)
+                if descent.value < best:
+                    best = descent.value
+                    status = SolveStatus.CONVERGED if descent.settled else SolveStatus.STOPPED
+        except Stop:
+            status = SolveStatus.CANCELLED
+        return run.solution(status)
+
+
+def roots_first(problem: PoseProblem) -> Stage:
+    """The stage that only places whole bodies."""
+    free = {
+        body.name: [chart.dof_names[q] for q in chosen if chart.is_root[q]]
+        for body, chart, chosen in zip(problem.bodies, problem.charts, problem.free_of_body, strict=True)
+    }
+    return Stage(free=free, name="roots")
+
+
+def carrier_depths(problem: PoseProblem, contact: str) -> IntArray:
+    """(k,) how deep in the manipulator's joint tree the joint sits that holds each contact point strongest."""
+    pair = next(c for c in problem.contacts if c.name == contact)
+    rig = problem.bodies[problem.body_index(pair.manipulator)].rig
+    depth = np.zeros(len(rig.joints), np.int64)
+    for joint, parent in enumerate(rig.parents):
+        depth[joint] = 0 if parent < 0 else depth[parent] + 1
+    points = pair.manipulator_points
+    held = np.zeros((len(points), len(rig.joints)))
+    for corner in range(3):
+        vertices = rig.faces[points.faces, corner]
+        for influence in range(rig.skin_joints.shape[1]):
+            share = points.barycentric[:, corner] * rig.skin_weights[vertices, influence]
+            np.add.at(held, (np.arange(len(points)), rig.skin_joints[vertices, influence]), share)
+    return depth[held.argmax(axis=1)]
+
+
+def random_start(problem: PoseProblem, random: np.random.Generator) -> FloatArray:
+    """A theta (d,) with angles up to half a radian from the start within the limits, and a random placement."""
+    lower, upper = problem.limits_of_theta
+    theta = problem.start + random.uniform(-0.5, 0.5, len(problem.start))
+    theta = np.where(problem.is_root & ~problem.is_translation, random.uniform(-np.pi, np.pi, len(theta)), theta)
+    reach = problem.manipulator_length * random.normal(0.0, 1.0, len(theta))
+    theta = np.where(problem.is_translation, problem.start + reach, theta)
+    return np.clip(theta, lower, upper)
