@@ -63,7 +63,11 @@ def contact_hosts() -> list[object]:
 
 @hookimpl
 def contact_formats() -> list[object]:
-    return []
+    return [
+        "contact_builtins.formats.gltf:GltfFiles",
+        "contact_builtins.formats.mesh_files:MeshFiles",
+        "contact_builtins.formats.urdf:UrdfFiles",
+    ]
 
 
 @hookimpl

@@ -1,0 +1,69 @@
+"""The glTF format: reads objects and skinned manipulators, writes posed scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from contact_builtins.formats.gltf_container import open_gltf
+from contact_builtins.formats.gltf_rig import rig_asset
+from contact_builtins.formats.gltf_scene import Part, read_nodes, read_parts
+from contact_builtins.formats.polygons import Polygons, surface_of
+from contact_builtins.formats.refusal import refusing
+from contact_builtins.formats.sidecar import read_sidecar, sidecar_beside
+from contact_core.document.asset import Asset
+from contact_core.errors import FileRefused, InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.pose.rig import Pose
+
+
+class GltfFiles:
+    """glTF 2.0, binary or JSON, on the standard library and numpy alone."""
+
+    name = "gltf"
+    suffixes = (".glb", ".gltf")
+    can_read = True
+    can_write = True
+
+    def read(self, path: Path, *, sidecar: Path | None = None) -> Asset:
+        """The scene in a file: one rig when any mesh is skinned, else one mesh. Raises FileRefused."""
+        path = Path(path)
+        told = sidecar or sidecar_beside(path)
+        with refusing(path, "a glTF 2.0 file"):
+            gltf = open_gltf(path)
+            nodes = read_nodes(gltf)
+            parts, notes = read_parts(gltf, nodes)
+            if not parts:
+                raise InvalidInput("its scene holds no triangles")
+            if any(part.skin is not None for part in parts):
+                return rig_asset(gltf, nodes, parts, read_sidecar(told) if told else None, notes)
+            if sidecar is not None:
+                raise FileRefused(f"{path} holds no skin, so the rig sidecar {sidecar} has no joints to describe.")
+            return _object_asset(path, parts, notes)
+
+    def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
+        """One GLB with every asset; rigs as skins in their pose. Raises FileRefused, InvalidInput."""
+        from contact_builtins.formats.gltf_writer import glb_bytes
+        from contact_core.whole_file import write_whole
+
+        if Path(path).suffix.lower() != ".glb":
+            raise FileRefused(f"{path}: glTF is written as one binary file; let its name end in .glb.")
+        write_whole(path, glb_bytes(assets, poses))
+
+
+def _object_asset(path: Path, parts: list[Part], notes: list[str]) -> Asset:
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts[:-1], strict=True)])
+    surface = surface_of(Polygons.of_triangles(np.concatenate([part.points for part in parts]), faces))
+    return Asset(
+        name=path.stem,
+        mesh=TriangleMesh(surface.points, surface.faces),
+        source_vertices=surface.source_vertices,
+        source_faces=surface.source_faces,
+        meters_per_unit=1.0,
+        up_axis="Y",
+        notes=(*notes, *surface.notes),
+        details={"format": "gltf", "polygons": len(faces)},
+    )

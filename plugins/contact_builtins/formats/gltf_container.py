@@ -1,0 +1,207 @@
+"""glTF 2.0 as bytes: the GLB container, buffers, accessors (strided, normalised, sparse).
+
+Nothing outside the file's own folder is ever opened, and no count is believed before it is checked.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import numpy.typing as npt
+
+from contact_builtins.formats.refusal import bounded, file_bytes
+from contact_core.errors import FileRefused, InvalidInput
+
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+COMPRESSED = {
+    "KHR_draco_mesh_compression": "Draco",
+    "EXT_meshopt_compression": "meshopt",
+    "KHR_meshopt_compression": "meshopt",
+}
+# Required extensions that change looks, not shapes.
+HARMLESS = ("KHR_materials_", "EXT_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "MSFT_texture_")
+UNDERSTOOD = ("KHR_mesh_quantization",)
+
+
+@dataclass(frozen=True, eq=False)
+class Gltf:
+    """A parsed file. document: its JSON. binary: the GLB's own chunk. path: where external buffers are sought."""
+
+    document: dict[str, Any]
+    binary: bytes
+    path: Path
+
+    def entries(self, kind: str) -> list[dict[str, Any]]:
+        """A top-level list of the document ("nodes", "meshes"), empty where absent."""
+        found = self.document.get(kind, [])
+        if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
+            raise InvalidInput(f"{kind} is not a list of objects")
+        return found
+
+    def entry(self, kind: str, index: Any) -> dict[str, Any]:
+        """One entry of a top-level list. Raises InvalidInput when there is none."""
+        entries = self.entries(kind)
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(entries):
+            raise InvalidInput(f"it names {kind}[{index!r}], but has {len(entries)} {kind}")
+        return entries[index]
+
+    @cached_property
+    def _buffers(self) -> list[bytes]:
+        return [self._buffer(index, entry) for index, entry in enumerate(self.entries("buffers"))]
+
+    def _buffer(self, index: int, entry: dict[str, Any]) -> bytes:
+        uri = entry.get("uri")
+        if uri is None:
+            if index:
+                raise InvalidInput(f"buffer {index} has no bytes")
+            data = self.binary
+        elif uri.startswith("data:"):
+            head, _, text = uri.partition(",")
+            data = _decode_base64(text) if head.endswith(";base64") else unquote(text).encode("latin-1")
+        else:
+            data = file_bytes(_beside(self.path, uri))
+        if len(data) < entry["byteLength"]:
+            raise InvalidInput(f"buffer {index} states {entry['byteLength']} bytes, but {len(data)} are there")
+        return data
+
+    def view(self, index: Any) -> tuple[bytes, int, int, int]:
+        """A buffer view: the buffer's bytes, where the view starts and ends in them, and its stride (0: packed)."""
+        entry = self.entry("bufferViews", index)
+        if any(name in COMPRESSED for name in entry.get("extensions", {})):
+            raise FileRefused(_compressed(self.path, entry["extensions"]))
+        self.entry("buffers", entry["buffer"])
+        data = self._buffers[entry["buffer"]]
+        start = bounded_offset(entry.get("byteOffset", 0))
+        end = start + bounded_offset(entry["byteLength"])
+        if end > len(data):
+            raise InvalidInput(f"bufferViews[{index}] ends at byte {end} of {len(data)}")
+        return data, start, end, bounded_offset(entry.get("byteStride", 0))
+
+    def accessor(self, index: Any) -> npt.NDArray[Any]:
+        """(count, width) values of an accessor, as stored; normalised integers as floats."""
+        entry = self.entry("accessors", index)
+        kind, width = np.dtype(COMPONENTS[entry["componentType"]]), WIDTHS[entry["type"]]
+        count = bounded(entry["count"], f"elements of accessors[{index}]")
+        if "bufferView" in entry:
+            values = self._elements(entry["bufferView"], entry.get("byteOffset", 0), kind, count, width)
+        else:
+            values = np.zeros((count, width), kind)
+        if "sparse" in entry:
+            values = self._with_sparse(values, entry["sparse"], kind, width)
+        return _denormalised(values) if entry.get("normalized") and kind.kind in "iu" else values
+
+    def _with_sparse(
+        self, values: npt.NDArray[Any], sparse: dict[str, Any], kind: np.dtype[Any], width: int
+    ) -> npt.NDArray[Any]:
+        count = bounded(sparse["count"], "sparse elements")
+        where, what = sparse["indices"], sparse["values"]
+        index_kind = np.dtype(COMPONENTS[where["componentType"]])
+        rows = self._elements(where["bufferView"], where.get("byteOffset", 0), index_kind, count, 1)[:, 0]
+        if len(rows) and int(rows.max()) >= len(values):
+            raise InvalidInput(f"a sparse accessor changes element {int(rows.max())} of {len(values)}")
+        changed = np.array(values)
+        changed[rows] = self._elements(what["bufferView"], what.get("byteOffset", 0), kind, count, width)
+        return changed
+
+    def _elements(self, view: Any, offset: Any, kind: np.dtype[Any], count: int, width: int) -> npt.NDArray[Any]:
+        data, start, end, stride = self.view(view)
+        start += bounded_offset(offset)
+        size = kind.itemsize * width
+        stride = stride or size
+        if stride < size or (count and start + stride * (count - 1) + size > end):
+            raise InvalidInput(
+                f"an accessor wants {count} elements of {size} bytes, {stride} apart, of {end - start} bytes"
+            )
+        return np.ndarray((count, width), kind, data, start, (stride, kind.itemsize))
+
+
+def open_gltf(path: Path) -> Gltf:
+    """Parse a .glb or .gltf file. Raises FileRefused, InvalidInput, or what a damaged file makes Python raise."""
+    data = file_bytes(path)
+    if data[:4] == b"glTF":
+        text, binary = _chunks(data)
+    else:
+        text, binary = data, b""
+    document = json.loads(text.decode("utf-8-sig"))
+    if not isinstance(document, dict) or "asset" not in document:
+        raise InvalidInput('it has no "asset" entry, which every glTF file has')
+    version = str(document["asset"].get("version", ""))
+    if not version.startswith("2."):
+        raise FileRefused(f"{path} is glTF version {version or 'unknown'}; version 2 is read. Export it anew.")
+    required = document.get("extensionsRequired", [])
+    if any(name in COMPRESSED for name in required):
+        raise FileRefused(_compressed(path, required))
+    for name in required:
+        if name not in UNDERSTOOD and not str(name).startswith(HARMLESS):
+            raise FileRefused(
+                f"{path} requires the glTF extension {name}, which is not read here. Export without it."
+            )
+    return Gltf(document, binary, path)
+
+
+def bounded_offset(value: Any) -> int:
+    """A byte offset or length that a file states. Raises InvalidInput."""
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 1 << 40:
+        raise InvalidInput(f"a byte offset or length is {value!r}")
+    return value
+
+
+def _chunks(data: bytes) -> tuple[bytes, bytes]:
+    """The JSON and the binary chunk of a GLB."""
+    _, version, length = np.frombuffer(data, "<u4", 3)
+    if version != 2:
+        raise InvalidInput(f"its container has version {version}; version 2 is read")
+    if length > len(data):
+        raise InvalidInput(f"it states {length} bytes, but ends after {len(data)}")
+    found: dict[int, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = (int(v) for v in np.frombuffer(data, "<u4", 2, at))
+        if at + 8 + size > len(data):
+            raise InvalidInput(f"a chunk states {size} bytes, but {len(data) - at - 8} are left")
+        found.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size + (-size) % 4
+    if JSON_CHUNK not in found:
+        raise InvalidInput("it has no JSON chunk")
+    return found[JSON_CHUNK], found.get(BINARY_CHUNK, b"")
+
+
+def _beside(path: Path, uri: str) -> Path:
+    """The path of an external buffer, which must lie in the file's own folder or below it."""
+    folder = path.resolve().parent
+    wanted = (folder / unquote(uri)).resolve()
+    if "://" in uri or not wanted.is_relative_to(folder):
+        raise FileRefused(
+            f"{path} wants its buffer from {uri!r}, outside its folder; only files below it are read."
+        )
+    if not wanted.is_file():
+        raise FileRefused(f"{path} needs its buffer {uri!r} beside it, but there is no such file. Copy it there.")
+    return wanted
+
+
+def _decode_base64(text: str) -> bytes:
+    try:
+        return base64.b64decode(text, validate=True)
+    except binascii.Error as error:
+        raise InvalidInput(f"a data URI is not base64: {error}") from error
+
+
+def _denormalised(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Integers as fractions of their largest value (glTF 2.0, 3.6.2.2)."""
+    largest = np.iinfo(values.dtype).max
+    return np.asarray(np.maximum(values.astype(np.float64) / largest, -1.0))
+
+
+def _compressed(path: Path, names: Any) -> str:
+    kind = next(COMPRESSED[name] for name in names if name in COMPRESSED)
+    return f"{path} is compressed with {kind}, which is not read here. Export it without mesh compression."

@@ -1,0 +1,209 @@
+"""Writing a GLB that other tools open: skins with their joints in the pose, objects as plain meshes."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from contact_builtins.formats.gltf_container import BINARY_CHUNK, JSON_CHUNK, MAGIC
+from contact_core._version import __version__
+from contact_core.arrays import FloatArray
+from contact_core.document.asset import Asset
+from contact_core.errors import InvalidInput
+from contact_core.pose.rig import Pose, Rig
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+COMPONENT_OF = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
+TYPE_OF = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+# glTF is y-up and in metres: what turns another up axis to +y.
+Y_FROM_UP = {
+    "Y": np.eye(3),
+    "Z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "X": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+}
+
+
+@dataclass
+class _Scene:
+    """A glTF document under construction."""
+
+    nodes: list[dict[str, Any]] = field(default_factory=list)
+    meshes: list[dict[str, Any]] = field(default_factory=list)
+    skins: list[dict[str, Any]] = field(default_factory=list)
+    accessors: list[dict[str, Any]] = field(default_factory=list)
+    views: list[dict[str, Any]] = field(default_factory=list)
+    roots: list[int] = field(default_factory=list)
+    binary: bytearray = field(default_factory=bytearray)
+
+    def accessor(self, values: npt.NDArray[Any], target: int | None = None, *, bounds: bool = False) -> int:
+        """Store (count, width) values; the new accessor's index."""
+        self.binary += b"\0" * (-len(self.binary) % 4)
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": values.nbytes}
+        if target is not None:
+            view["target"] = target
+        self.binary += np.ascontiguousarray(values).tobytes()
+        self.views.append(view)
+        entry: dict[str, Any] = {
+            "bufferView": len(self.views) - 1,
+            "componentType": COMPONENT_OF[values.dtype.str],
+            "count": len(values),
+            "type": TYPE_OF[values.shape[1]],
+        }
+        if bounds:
+            entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        self.accessors.append(entry)
+        return len(self.accessors) - 1
+
+    def node(self, **entry: Any) -> int:
+        self.nodes.append(entry)
+        return len(self.nodes) - 1
+
+
+def glb_bytes(assets: Sequence[Asset], poses: Mapping[str, Pose]) -> bytes:
+    """The bytes of a GLB. A rig takes the pose under its asset's name, else rests; an asset without a rig is
+    moved by a pose of one joint, its world transform. Raises InvalidInput on poses that fit nothing."""
+    unknown = sorted(set(poses) - {asset.name for asset in assets})
+    if unknown:
+        raise InvalidInput(
+            f"there is a pose for {unknown[0]!r}, but no such asset; assets: {[a.name for a in assets]}."
+        )
+    scene = _Scene()
+    for asset in assets:
+        holder = scene.node(name=asset.name, children=[], matrix=_columns(_to_gltf(asset)))
+        scene.roots.append(holder)
+        if asset.rig is not None:
+            _add_rig(scene, holder, asset.rig, poses.get(asset.name, Pose.rest(asset.rig)))
+        else:
+            _add_object(scene, holder, asset, poses.get(asset.name))
+    return _container(scene)
+
+
+def _add_object(scene: _Scene, holder: int, asset: Asset, pose: Pose | None) -> None:
+    if pose is not None and len(pose.joints) != 1:
+        raise InvalidInput(f"{asset.name!r} has no rig: its pose is one transform, but {len(pose.joints)} came.")
+    mesh = _add_mesh(scene, asset.name, asset.mesh.points, asset.mesh.faces, asset.mesh.vertex_normals, {})
+    world = np.eye(4) if pose is None else pose.local[0]
+    scene.nodes[holder]["children"].append(scene.node(name=f"{asset.name} mesh", mesh=mesh, **_transform(world)))
+
+
+def _add_rig(scene: _Scene, holder: int, rig: Rig, pose: Pose) -> None:
+    local = rig.rest_local.copy()
+    for name, matrix in zip(pose.joints, pose.local, strict=True):
+        local[rig.joint_index(name)] = matrix
+    first = len(scene.nodes)
+    for name, matrix in zip(rig.joints, local, strict=True):
+        scene.node(name=name, **_transform(matrix))
+    for index, parent in enumerate(rig.parents):
+        owner = scene.nodes[first + int(parent)] if parent >= 0 else scene.nodes[holder]
+        owner.setdefault("children", []).append(first + index)
+    inverse = np.linalg.inv(rig.bind_world).transpose(0, 2, 1).reshape(-1, 16).astype("<f4")
+    joints = [first + index for index in range(len(rig.joints))]
+    scene.skins.append({"name": rig.name, "joints": joints, "inverseBindMatrices": scene.accessor(inverse)})
+    normals = rig.surface.with_points(rig.bind_points).vertex_normals
+    mesh = _add_mesh(scene, rig.name, rig.bind_points, rig.faces, normals, _influences(rig))
+    scene.nodes[holder]["children"].append(
+        scene.node(name=f"{rig.name} skin", mesh=mesh, skin=len(scene.skins) - 1)
+    )
+
+
+def _influences(rig: Rig) -> dict[str, npt.NDArray[Any]]:
+    """JOINTS_k and WEIGHTS_k in sets of four."""
+    count = rig.skin_joints.shape[1]
+    padding = (-count) % 4
+    joints = np.pad(rig.skin_joints, ((0, 0), (0, padding))).astype("<u2")
+    weights = np.pad(rig.skin_weights, ((0, 0), (0, padding))).astype("<f4")
+    joints[weights == 0] = 0  # the specification asks for joint 0 where the weight is 0
+    sets = {}
+    for k in range((count + padding) // 4):
+        sets[f"JOINTS_{k}"] = joints[:, 4 * k : 4 * k + 4]
+        sets[f"WEIGHTS_{k}"] = weights[:, 4 * k : 4 * k + 4]
+    return sets
+
+
+def _add_mesh(
+    scene: _Scene, name: str, points: FloatArray, faces: Any, normals: FloatArray, more: dict[str, npt.NDArray[Any]]
+) -> int:
+    filled = np.where(np.abs(normals).sum(axis=1, keepdims=True) > 0, normals, [0.0, 0.0, 1.0])
+    attributes = {
+        "POSITION": scene.accessor(points.astype("<f4"), ARRAY_BUFFER, bounds=True),
+        "NORMAL": scene.accessor(filled.astype("<f4"), ARRAY_BUFFER),
+    }
+    attributes |= {key: scene.accessor(values, ARRAY_BUFFER) for key, values in more.items()}
+    indices = scene.accessor(np.asarray(faces).reshape(-1, 1).astype("<u4"), ELEMENT_ARRAY_BUFFER)
+    scene.meshes.append({"name": name, "primitives": [{"attributes": attributes, "indices": indices}]})
+    return len(scene.meshes) - 1
+
+
+def _to_gltf(asset: Asset) -> FloatArray:
+    """(4, 4) from the asset's units and up axis to metres and y up."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = Y_FROM_UP[asset.up_axis] * (asset.meters_per_unit or 1.0)
+    return matrix
+
+
+def _transform(matrix: FloatArray) -> dict[str, Any]:
+    """A node's TRS where the matrix is one (viewers and DCCs prefer it for joints), else its matrix."""
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    if (scale > 0).all():
+        rotation = matrix[:3, :3] / scale
+        if np.linalg.det(rotation) > 0 and np.abs(rotation.T @ rotation - np.eye(3)).max() < 1e-6:
+            w, x, y, z = quaternion(rotation)
+            trs: dict[str, Any] = {"translation": matrix[:3, 3].tolist(), "rotation": [x, y, z, w]}
+            return trs if np.abs(scale - 1).max() < 1e-7 else {**trs, "scale": scale.tolist()}
+    return {"matrix": _columns(matrix)}
+
+
+def quaternion(rotation: FloatArray) -> list[float]:
+    """[w, x, y, z] of a (3, 3) rotation (Bar-Itzhack 2000: the dominant eigenvector, stable everywhere)."""
+    m = rotation
+    k = np.array(
+        [
+            [m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [m[2, 1] - m[1, 2], m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
+            [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]],
+            [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], m[2, 2] - m[0, 0] - m[1, 1]],
+        ]
+    )
+    vector = np.linalg.eigh(k)[1][:, -1]
+    return [float(value) for value in (vector if vector[0] >= 0 else -vector)]
+
+
+def _columns(matrix: FloatArray) -> list[float]:
+    return [float(value) for value in matrix.T.ravel()]
+
+
+def _container(scene: _Scene) -> bytes:
+    document = {
+        "asset": {"version": "2.0", "generator": f"contact-core {__version__}"},
+        "scene": 0,
+        "scenes": [{"nodes": scene.roots}],
+        "nodes": [_without_empty(node) for node in scene.nodes],
+        "meshes": scene.meshes,
+        "skins": scene.skins,
+        "accessors": scene.accessors,
+        "bufferViews": scene.views,
+        "buffers": [{"byteLength": len(scene.binary)}],
+    }
+    text = json.dumps(_without_empty(document), separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    binary = bytes(scene.binary) + b"\0" * (-len(scene.binary) % 4)
+    total = 12 + 8 + len(text) + 8 + len(binary)
+    head = struct.pack("<III", MAGIC, 2, total)
+    return (
+        head
+        + struct.pack("<II", len(text), JSON_CHUNK)
+        + text
+        + struct.pack("<II", len(binary), BINARY_CHUNK)
+        + binary
+    )
+
+
+def _without_empty(entry: dict[str, Any]) -> dict[str, Any]:
+    """glTF forbids empty lists."""
+    return {key: value for key, value in entry.items() if value != []}

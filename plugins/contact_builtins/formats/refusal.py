@@ -1,0 +1,60 @@
+"""Bad files are refused in one sentence: no traceback, no hang, no surprise allocation."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from contact_core.errors import FileRefused, InvalidInput
+
+MAX_FILE_BYTES = 1 << 30
+MAX_ELEMENTS = 20_000_000  # vertices, faces, accessor rows: far above any mesh that a person paints on
+
+# What Python raises when a file's own words contradict one another.
+DAMAGE = (
+    InvalidInput,
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RecursionError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
+
+
+@contextmanager
+def refusing(path: Path, what: str) -> Iterator[None]:
+    """Everything that a damaged `what` ("an OBJ file") can cause, as FileRefused naming the file."""
+    try:
+        yield
+    except FileRefused:
+        raise
+    except OSError as error:
+        raise FileRefused(f"{path} cannot be read: {error.strerror or error}.") from error
+    except DAMAGE as error:
+        reason = str(error).strip().rstrip(".") or type(error).__name__
+        raise FileRefused(f"{path} was to be {what}, but is damaged: {reason[:300]}. Export it anew.") from error
+
+
+def file_bytes(path: Path) -> bytes:
+    """The whole file, if it is a file and not too large. Raises FileRefused."""
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise FileRefused(f"{path} is not a file; give the path of a mesh or rig file.")
+        if size > MAX_FILE_BYTES:
+            raise FileRefused(f"{path} has {size} bytes; files up to {MAX_FILE_BYTES} bytes are read. Split it.")
+        return path.read_bytes()
+    except OSError as error:
+        raise FileRefused(f"{path} cannot be read: {error.strerror or error}.") from error
+
+
+def bounded(count: int, what: str) -> int:
+    """A count that a file states, if it is believable. Raises InvalidInput."""
+    if not 0 <= count <= MAX_ELEMENTS:
+        raise InvalidInput(f"it states {count} {what}; 0 to {MAX_ELEMENTS} are read")
+    return count
