@@ -145,7 +145,7 @@ class Weigh(BaseCommand):
 @register_command
 @dataclass(frozen=True, eq=False)
 class Detach(BaseCommand):
-    """A patch gets a copy of its shape under a key of its own, and follows its partners no more."""
+    """A patch gets its shape, deviation included, under a key of its own, and follows its partners no more."""
 
     json_id: ClassVar[str] = "contact.detach"
     patch: str
@@ -157,8 +157,10 @@ class Detach(BaseCommand):
     def apply(self, document: ContactDocument) -> ContactDocument:
         patch = document.patch(self.patch)
         check_free(document.shapes, self.shape, "shape")
-        document = document.with_shape(self.shape, document.shapes[patch.shape])
-        document = document.with_patches(replace(patch, shape=self.shape, original=True))
+        own = document.shapes[patch.shape].with_axis(document.effective_axis(patch.name))
+        document = document.with_shape(self.shape, own)
+        alone = replace(patch, shape=self.shape, original=True, turns=(), along=1.0, spread=1.0)
+        document = document.with_patches(alone)
         return without_unused_shapes(_with_originals(document))
 
 

@@ -1,0 +1,191 @@
+"""The axis of a patch on a surface: drawn through picked points, taken apart into a shape, traced again elsewhere.
+
+The paper's ParameterizeAxis and ReconstructAxis, with its contradictions settled (ADR 0021): the tangent of the
+last point is the forward ending direction in both, and an axis of one point keeps the direction that it was given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from contact_core.arrays import ComplexArray, FloatArray, IntArray, frozen
+from contact_core.contact.placement import Root
+from contact_core.contact.shape import AxisShape
+from contact_core.errors import InvalidInput
+from contact_core.geometry.exact_geodesics import log_map
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tracing import trace_chains
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """An axis of m points on a surface.
+
+    tangents: (m,) unit complex, the initial direction of the segment that leaves each point; at the last point the
+    ending direction of the last segment. remaining: (m,) length that a boundary kept from being walked up to each
+    point (surface units), 0 where the axis fits.
+    """
+
+    points: SurfacePoints
+    tangents: ComplexArray
+    remaining: FloatArray
+
+    def __post_init__(self) -> None:
+        m = len(self.points)
+        object.__setattr__(self, "tangents", frozen(self.tangents, np.complex128, (m,), "tangents of an axis"))
+        object.__setattr__(self, "remaining", frozen(self.remaining, np.float64, (m,), "remaining"))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def root(self) -> Root:
+        """Where the axis starts, and how."""
+        return Root.at(self.points[0], complex(self.tangents[0]))
+
+
+class Chains(NamedTuple):
+    """k chains of legs in the form that `trace_chains` takes: the lengths of the first legs, then the others."""
+
+    first: FloatArray  # (k,)
+    offsets: IntArray  # (k + 1,)
+    turns: FloatArray
+    lengths: FloatArray
+
+
+def draw_axis(
+    mesh: TriangleMesh, picks: SurfacePoints, heading: complex | None = None, *, dense: bool = True
+) -> tuple[AxisShape, Axis]:
+    """The axis through picked points (k >= 1), joined by shortest geodesics.
+
+    dense: every edge crossing on the way becomes an axis point, which spreads the anchors of patch points evenly;
+    otherwise only the picks and the saddle vertices that a geodesic bends round. One pick needs a heading (unit
+    complex in its tangent frame). Repeated picks are taken once. Raises InvalidInput for picks not connected.
+    """
+    if not len(picks):
+        raise InvalidInput("an axis needs at least one point, but none came.")
+    lengths: list[float] = []
+    turns: list[float] = []  # at the start of each segment
+    start, arrived, heading_at_start = picks[0], None, heading
+    for k in range(1, len(picks)):
+        leg = log_map(mesh, start, picks[k])
+        if leg.anchor[0] < 0:
+            raise InvalidInput(f"axis points {k - 1} and {k} lie on parts of the surface that are not connected.")
+        if leg.distance[0] <= 1e-12 * mesh.bounding_box_diagonal:
+            continue
+        leaving = complex(leg.first_leg[0]) / abs(complex(leg.first_leg[0]))
+        if arrived is None:
+            heading_at_start, turn = leaving, 0.0
+        else:
+            turn = float(np.angle(leaving / arrived))
+        new_lengths, new_turns = _segments(mesh, start, leg, dense)
+        lengths.extend(new_lengths)
+        turns.extend([turn, *new_turns])
+        start, arrived = picks[k], complex(leg.headings[0])
+    if heading_at_start is None:
+        raise InvalidInput("an axis of one point needs a heading; give one, or a second point.")
+    shape = AxisShape(np.array(lengths), np.array(turns[1:]))
+    return shape, reconstruct_axis(mesh, shape, Root.at(picks[0], heading_at_start))
+
+
+def parameterize_axis(mesh: TriangleMesh, points: SurfacePoints, heading: complex | None = None) -> AxisShape:
+    """The shape of the axis with exactly these points, and saddle vertices between them (paper: Algorithm 1)."""
+    shape, _ = draw_axis(mesh, points, heading, dense=False)
+    return shape
+
+
+def reconstruct_axis(
+    mesh: TriangleMesh, shape: AxisShape, root: Root, *, mirrored: bool = False, unit: float = 1.0
+) -> Axis:
+    """The axis of `shape` traced from a root (paper: Algorithm 3). unit: factor on all lengths.
+
+    mirrored: every turning angle negated. Where a boundary stops the axis, its further points lie at the stop.
+    """
+    m = shape.point_count
+    if m == 1:
+        return Axis(root.point(), np.array([root.heading]), np.zeros(1))
+    turns = -shape.turning_angles if mirrored else shape.turning_angles  # (m - 2,)
+    chains = _prefix_chains(shape.lengths * (shape.along * unit), turns)
+    starts = SurfacePoints(np.full(m - 1, root.face), np.tile(root.barycentric, (m - 1, 1)))
+    trace = trace_chains(mesh, starts, chains.first * root.heading, chains.offsets, chains.turns, chains.lengths)
+    tangents = np.concatenate([[root.heading], trace.headings])  # (m,)
+    tangents[1:-1] *= np.exp(1j * turns)
+    points = SurfacePoints.concatenate([root.point(), trace.points])
+    return Axis(points, tangents / np.abs(tangents), np.concatenate([[0.0], trace.remaining]))
+
+
+def root_from_point(
+    mesh: TriangleMesh,
+    shape: AxisShape,
+    index: int,
+    point: SurfacePoints,
+    tangent: complex,
+    *,
+    mirrored: bool = False,
+    unit: float = 1.0,
+) -> Root:
+    """The root from which the axis passes its point `index` at `point` with `tangent` there.
+
+    Walks the axis backwards. Raises InvalidInput where a boundary is in the way.
+    """
+    if index == 0:
+        return Root.at(point, tangent)
+    turns = -shape.turning_angles if mirrored else shape.turning_angles
+    lengths = shape.lengths[:index][::-1] * (shape.along * unit)
+    last = index == shape.point_count - 1
+    arriving = tangent if last else tangent * np.exp(-1j * turns[index - 1])  # of the forward segment at `index`
+    back = trace_chains(
+        mesh,
+        point,
+        np.array([-arriving * lengths[0]]),
+        np.array([0, index - 1]),
+        -turns[: index - 1][::-1],
+        lengths[1:],
+    )
+    if back.remaining[0] > 1e-9 * mesh.bounding_box_diagonal:
+        raise InvalidInput("the axis would start beyond the boundary of the surface.")
+    return Root.at(back.points, -complex(back.headings[0]))
+
+
+def _segments(
+    mesh: TriangleMesh, start: SurfacePoints, leg: object, dense: bool
+) -> tuple[list[float], list[float]]:
+    """Lengths of the segments of one geodesic, and the turns between them."""
+    first, turns, rest = leg.first_leg, leg.turning_angles, leg.lengths  # type: ignore[attr-defined]
+    knots = np.concatenate([[abs(complex(first[0]))], rest])  # lengths of the straight legs
+    if not dense:
+        return knots.tolist(), turns.tolist()
+    way = trace_chains(mesh, start, first, np.array([0, len(rest)]), turns, rest, polyline=True)
+    assert way.polylines is not None
+    steps = np.linalg.norm(np.diff(way.polylines[0].positions(mesh), axis=0), axis=1)
+    total, bends = float(knots.sum()), np.cumsum(knots)
+    marks = np.cumsum(steps)[:-1]  # distances of the crossings from the start
+    near = 1e-9 * max(total, 1e-300)
+    marks = marks[(marks > near) & (marks < total - near)]
+    marks = marks[np.abs(marks[:, None] - bends[None, :-1]).min(axis=1, initial=np.inf) > near]
+    stops = np.concatenate([marks, bends])
+    order = np.argsort(stops, kind="stable")
+    turn_at = np.concatenate([np.zeros(len(marks)), turns, [0.0]])[order]
+    stops = stops[order]
+    keep = np.concatenate([np.diff(stops, prepend=0.0) > near])
+    keep |= turn_at != 0.0
+    return np.diff(stops[keep], prepend=0.0).tolist(), turn_at[keep][:-1].tolist()
+
+
+def _prefix_chains(lengths: FloatArray, turns: FloatArray) -> Chains:
+    """The chain from the root to each further point of an axis; segments in a straight run become one leg."""
+    along = np.concatenate([[0.0], np.cumsum(lengths)])  # (m,) distance of each point from the root
+    knots = np.concatenate([[0], np.flatnonzero(turns) + 1])  # points where a straight run starts
+    points = np.arange(1, len(along))
+    run = np.searchsorted(knots, points, side="left") - 1  # (m - 1,) the run that ends at or holds each point
+    partial = along[points] - along[knots[run]]  # (m - 1,)
+    whole = np.diff(along[knots])  # lengths of the whole runs
+    offsets = np.concatenate([[0], np.cumsum(run)])
+    first = np.where(run == 0, partial, whole[0] if len(whole) else 0.0)
+    bend = turns[knots[1:] - 1]
+    chain_turns = np.concatenate([bend[:r] for r in run]) if len(run) else np.zeros(0)
+    chain_lengths = np.concatenate([np.append(whole[1:r], p) if r else whole[:0] for r, p in zip(run, partial)])  # noqa: B905
+    return Chains(first, offsets, chain_turns, chain_lengths)

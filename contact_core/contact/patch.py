@@ -1,0 +1,193 @@
+"""A patch on a surface: its points as geodesics from the closest axis point, and back.
+
+The paper's ParameterizePatch and ReconstructPatch (Algorithms 2 and 4) with its contradictions settled (ADR 0021).
+A shortest path that bends round saddle vertices keeps its bends, so that reconstruction is exact. A patch is
+parameterized once; edits change its axis, and the points follow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact_core.arrays import BoolArray, ComplexArray, FloatArray, IntArray, frozen
+from contact_core.contact.axis import Axis, reconstruct_axis
+from contact_core.contact.placement import Root
+from contact_core.contact.shape import AxisShape, PatchCoordinates, PatchShape
+from contact_core.errors import InvalidInput
+from contact_core.geometry.exact_geodesics import LogMap, log_map
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tracing import trace_chains
+
+
+@dataclass(frozen=True, eq=False)
+class PatchPoints:
+    """A reconstructed patch. points: n. remaining: (n,) length that a boundary kept from being walked, on the axis
+    or from it; such points lie on the boundary, and are reported rather than dropped."""
+
+    points: SurfacePoints
+    remaining: FloatArray
+    axis: Axis
+
+    def __post_init__(self) -> None:
+        n = len(self.points)
+        object.__setattr__(self, "remaining", frozen(self.remaining, np.float64, (n,), "remaining"))
+
+    @property
+    def ran_off(self) -> BoolArray:
+        """(n,) which points a boundary stopped."""
+        return np.asarray(self.remaining > 0.0)
+
+
+def parameterize_patch(
+    mesh: TriangleMesh,
+    axis: Axis,
+    points: SurfacePoints,
+    *,
+    anchors: IntArray | None = None,
+    shape: AxisShape | None = None,
+    mirrored: bool = False,
+    unit: float = 1.0,
+) -> PatchCoordinates:
+    """Coordinates of n points relative to an axis (paper: Algorithm 2, z = r theta / T).
+
+    Each point is anchored at its closest axis point, or at anchors (n,) chosen by hand (-1: the closest).
+    shape, mirrored, unit: how `axis` was reconstructed; the coordinates are those before scaling and mirroring.
+    Raises InvalidInput naming the first point that no axis point reaches.
+    """
+    if anchors is None:
+        log = log_map(mesh, axis.points, points)
+        _check_reached(log.anchor)
+        coordinates = _relative(log, axis.tangents[log.anchor], log.anchor)
+    else:
+        coordinates = _bound(mesh, axis, points, np.asarray(anchors, dtype=np.int64))
+    return _unshaped(coordinates, shape, mirrored, unit)
+
+
+def reconstruct_patch(
+    mesh: TriangleMesh,
+    shape: PatchShape,
+    root: Root,
+    *,
+    axis_shape: AxisShape | None = None,
+    mirrored: bool = False,
+    unit: float = 1.0,
+) -> PatchPoints:
+    """The patch of `shape` at a root (paper: Algorithm 4, z t' or, mirrored, conj(z) t').
+
+    axis_shape: in place of the shape's own axis (a deviation). unit: factor on all lengths, for a surface in other
+    units than the shape's.
+    """
+    axis_shape = axis_shape or shape.axis
+    axis = reconstruct_axis(mesh, axis_shape, root, mirrored=mirrored, unit=unit)
+    return points_from_axis(mesh, shape.coordinates, axis, axis_shape, mirrored=mirrored, unit=unit)
+
+
+def points_from_axis(
+    mesh: TriangleMesh,
+    coordinates: PatchCoordinates,
+    axis: Axis,
+    axis_shape: AxisShape,
+    *,
+    mirrored: bool = False,
+    unit: float = 1.0,
+) -> PatchPoints:
+    """The points that hang on a reconstructed axis: one trace each, all in one batch."""
+    legs, lengths = _scaled(coordinates, axis_shape.along * unit, axis_shape.spread * unit)
+    angles = coordinates.chain_angles
+    if mirrored:
+        legs, angles = np.conj(legs), -angles
+    anchors = coordinates.anchors
+    trace = trace_chains(
+        mesh, axis.points[anchors], legs * axis.tangents[anchors], coordinates.chain_starts, angles, lengths
+    )
+    return PatchPoints(trace.points, trace.remaining + axis.remaining[anchors], axis)
+
+
+def transfer_patch(
+    mesh: TriangleMesh, axis: Axis, axis_shape: AxisShape, points: SurfacePoints, target: TriangleMesh, root: Root
+) -> PatchPoints:
+    """Parameterize on one mesh, reconstruct as the mirror image on another: the paper's Algorithm 5 in one go."""
+    coordinates = parameterize_patch(mesh, axis, points)
+    placed = reconstruct_axis(target, axis_shape, root, mirrored=True)
+    return points_from_axis(target, coordinates, placed, axis_shape, mirrored=True)
+
+
+def _scaled(coordinates: PatchCoordinates, along: float, spread: float) -> tuple[ComplexArray, FloatArray]:
+    """First legs stretched along and across the axis, and the legs after them by as much as the first grew."""
+    legs, lengths = coordinates.legs, coordinates.chain_lengths
+    if along == spread:
+        return (legs, lengths) if along == 1.0 else (legs * along, lengths * along)
+    stretched = legs.real * along + 1j * (legs.imag * spread)
+    if not len(lengths):
+        return stretched, lengths
+    size = np.abs(legs)
+    growth = np.divide(np.abs(stretched), size, out=np.full(len(size), np.sqrt(along * spread)), where=size > 0.0)
+    return stretched, lengths * np.repeat(growth, np.diff(coordinates.chain_starts))
+
+
+def _unshaped(
+    coordinates: PatchCoordinates, shape: AxisShape | None, mirrored: bool, unit: float
+) -> PatchCoordinates:
+    """Coordinates measured on a scaled or mirrored axis, as they are on the axis before that."""
+    along, spread = (shape.along * unit, shape.spread * unit) if shape is not None else (unit, unit)
+    legs, lengths = _scaled(coordinates, 1.0 / along, 1.0 / spread)
+    angles = coordinates.chain_angles
+    if mirrored:
+        legs, angles = np.conj(legs), -angles
+    return PatchCoordinates(coordinates.anchors, legs, coordinates.chain_starts, angles, lengths)
+
+
+def _relative(log: LogMap, tangents: ComplexArray, anchors: IntArray) -> PatchCoordinates:
+    return PatchCoordinates(
+        anchors, log.first_leg / tangents, log.offsets, log.turning_angles, log.lengths
+    )  # fmt: skip
+
+
+def _bound(mesh: TriangleMesh, axis: Axis, points: SurfacePoints, anchors: IntArray) -> PatchCoordinates:
+    """Coordinates with anchors chosen by hand: one log map per anchor that is used."""
+    if anchors.shape != (len(points),) or (len(anchors) and not -1 <= anchors.min() <= anchors.max() < len(axis)):
+        raise InvalidInput(
+            f"anchors need one axis point 0..{len(axis) - 1}, or -1, for each of {len(points)} points."
+        )
+    together: PatchCoordinates | None = None
+    order = []
+    for anchor in np.unique(anchors):
+        chosen = np.flatnonzero(anchors == anchor)
+        sources = axis.points if anchor < 0 else axis.points[anchor]
+        log = log_map(mesh, sources, points[chosen])
+        _check_reached(log.anchor)
+        at = log.anchor if anchor < 0 else np.full(len(chosen), anchor)
+        part = _relative(log, axis.tangents[at], at)
+        together = part if together is None else PatchCoordinates.concatenate(together, part)
+        order.append(chosen)
+    if together is None:
+        whole, number = np.zeros(0, np.int64), np.zeros(0)
+        return PatchCoordinates(whole, number.astype(complex), np.zeros(1, np.int64), number, number)
+    return _reordered(together, np.argsort(np.concatenate(order)))
+
+
+def _reordered(coordinates: PatchCoordinates, order: IntArray) -> PatchCoordinates:
+    """The same points in another order."""
+    counts = np.diff(coordinates.chain_starts)
+    starts = np.concatenate([[0], np.cumsum(counts[order])])
+    rows = np.concatenate(
+        [np.arange(coordinates.chain_starts[k], coordinates.chain_starts[k + 1]) for k in order] or [np.zeros(0)]
+    ).astype(np.int64)
+    return PatchCoordinates(
+        coordinates.anchors[order],
+        coordinates.legs[order],
+        starts,
+        coordinates.chain_angles[rows],
+        coordinates.chain_lengths[rows],
+    )
+
+
+def _check_reached(anchors: IntArray) -> None:
+    if len(anchors) and anchors.min() < 0:
+        raise InvalidInput(
+            f"patch point {int(np.argmin(anchors))} lies on a part of the surface that the axis does not reach."
+            " Split the patch by surface and keep the parts as a group."
+        )

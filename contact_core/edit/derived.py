@@ -1,0 +1,135 @@
+"""Derived geometry: where patches are on their meshes, reconstructed when asked for and kept in a bounded cache.
+
+Nothing of it is in the document. The cache is keyed by values (digests, roots, angles), so undo and redo find what
+was there, and equal patches share it.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping
+from typing import TypeVar, cast
+
+from contact_core.contact.axis import Axis, reconstruct_axis, root_from_point
+from contact_core.contact.linkage import follow_link
+from contact_core.contact.patch import PatchPoints, points_from_axis
+from contact_core.contact.placement import Link, Root
+from contact_core.document.document import ContactDocument
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+
+MOST_POINTS = 1_000_000  # about 60 MB
+T = TypeVar("T")
+
+
+class Derived:
+    """Roots, axes and points of patches on the meshes of a session.
+
+    computed: how many axes and point sets were traced so far; tests guard the cost by counting.
+    """
+
+    def __init__(self, meshes: Mapping[str, TriangleMesh]) -> None:
+        self._meshes = meshes
+        self._kept: OrderedDict[Hashable, tuple[object, int]] = OrderedDict()
+        self._points = 0
+        self.computed = 0
+
+    def mesh(self, surface: str) -> TriangleMesh:
+        """The mesh behind a surface's name. Raises InvalidInput where the session was not given it."""
+        try:
+            return self._meshes[surface]
+        except KeyError:
+            raise InvalidInput(
+                f"the mesh of {surface!r} is not loaded: give it to the session by add_surface({surface!r}, mesh)."
+            ) from None
+
+    def unit(self, document: ContactDocument, name: str) -> float:
+        """Surface units of a patch's surface per unit of its shape."""
+        patch = document.patch(name)
+        return document.shapes[patch.shape].meters_per_unit / document.surface(patch.surface).meters_per_unit
+
+    def root(self, document: ContactDocument, name: str) -> Root:
+        """Where the axis of a patch starts, for a child as its parent's axis leads there."""
+        patch = document.patch(name)
+        link = patch.placement
+        if not isinstance(link, Link):
+            return link
+        key = ("root", self._axis_key(document, link.parent), link, self._shape_key(document, name))
+        return self._cached(key, 1, lambda: self._linked_root(document, name, link))
+
+    def axis(self, document: ContactDocument, name: str) -> Axis:
+        """The axis of a patch on its surface."""
+        patch = document.patch(name)
+        shape = document.effective_axis(name)
+
+        def trace() -> Axis:
+            self.computed += 1
+            return reconstruct_axis(
+                self.mesh(patch.surface),
+                shape,
+                self.root(document, name),
+                mirrored=patch.mirrored,
+                unit=self.unit(document, name),
+            )
+
+        return self._cached(("axis", self._axis_key(document, name)), shape.point_count, trace)
+
+    def patch(self, document: ContactDocument, name: str) -> PatchPoints:
+        """The points of a patch on its surface."""
+        patch = document.patch(name)
+        coordinates = document.shapes[patch.shape].coordinates
+
+        def trace() -> PatchPoints:
+            axis = self.axis(document, name)
+            self.computed += 1
+            return points_from_axis(
+                self.mesh(patch.surface),
+                coordinates,
+                axis,
+                document.effective_axis(name),
+                mirrored=patch.mirrored,
+                unit=self.unit(document, name),
+            )
+
+        return self._cached(("points", self._axis_key(document, name), coordinates.digest), len(coordinates), trace)
+
+    def _linked_root(self, document: ContactDocument, name: str, link: Link) -> Root:
+        patch = document.patch(name)
+        mesh = self.mesh(patch.surface)
+        point, tangent, _ = follow_link(mesh, self.axis(document, link.parent), link)
+        return root_from_point(
+            mesh,
+            document.effective_axis(name),
+            link.own_point,
+            point,
+            tangent,
+            mirrored=patch.mirrored,
+            unit=self.unit(document, name),
+        )
+
+    def _axis_key(self, document: ContactDocument, name: str) -> Hashable:
+        """All that the axis of a patch depends on, by value."""
+        placement = document.patch(name).placement
+        if isinstance(placement, Link):
+            return self._axis_key(document, placement.parent), placement, self._shape_key(document, name)
+        return placement, self._shape_key(document, name)
+
+    def _shape_key(self, document: ContactDocument, name: str) -> Hashable:
+        patch = document.patch(name)
+        surface = document.surface(patch.surface)
+        shape = document.shapes[patch.shape]
+        unit = shape.meters_per_unit / surface.meters_per_unit
+        own = (patch.turns, patch.along, patch.spread)
+        return surface.digest, shape.axis.digest, own, patch.mirrored, unit
+
+    def _cached(self, key: Hashable, size: int, make: Callable[[], T]) -> T:
+        kept = self._kept.get(key)
+        if kept is not None:
+            self._kept.move_to_end(key)
+            return cast("T", kept[0])
+        value = make()
+        self._kept[key] = (value, size)
+        self._points += size
+        while self._points > MOST_POINTS and len(self._kept) > 1:
+            self._points -= self._kept.popitem(last=False)[1][1]
+        return value

@@ -1,0 +1,175 @@
+"""Verbs that move patches and bend their axes."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import replace
+from typing import Any
+
+from contact_core.contact.axis import root_from_point
+from contact_core.contact.linkage import link_to
+from contact_core.contact.mirror import mirrored_root
+from contact_core.contact.placement import Link, Root
+from contact_core.contact.transfer import transported
+from contact_core.document.document import Patch
+from contact_core.edit.commands import Bend, LinkPatch, Mirror, Rotate, Scale, Transfer, Translate, Unlink
+from contact_core.edit.verbs.editor import Editor
+from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.geometry.surface_point import SurfacePoints
+
+
+class PlacingVerbs(Editor):
+    """Translate, rotate, bend, scale, mirror, transfer, link."""
+
+    def translate(self, patch: str, to: SurfacePoints) -> int:
+        """Move a patch so that its first axis point comes to one surface point, kept parallel along the way."""
+        root = transported(self.mesh_of(patch), self.root(patch), to)
+        return self.submit(Translate(patch, self.placement_at(patch, root)))
+
+    def place(
+        self, patch: str, point: SurfacePoints, *, heading: complex | None = None, direction: Any = None
+    ) -> int:
+        """Move a patch to a surface point with a given heading, or a direction (3,) in surface space."""
+        root = self.root_at(self.document.patch(patch).surface, point, heading, direction)
+        return self.submit(Translate(patch, self.placement_at(patch, root)))
+
+    def rotate(self, patch: str, angle: float, *, about: int = 0) -> int:
+        """Turn a patch by `angle` (radians, counter-clockwise seen from outside) about one of its axis points."""
+        turn = cmath.exp(1j * angle)
+        link = self.document.patch(patch).placement
+        if isinstance(link, Link) and link.own_point == about:
+            return self.submit(Rotate(patch, replace(link, heading=link.heading + angle)))
+        if about == 0:
+            root = self.root(patch)
+            return self.submit(Rotate(patch, self.placement_at(patch, root.heading_to(root.heading * turn))))
+        axis = self.axis(patch)
+        if not 0 < about < len(axis):
+            raise CommandRejected(f"the axis of {patch!r} has the points 0..{len(axis) - 1}, but {about} came.")
+        root = root_from_point(
+            self.mesh_of(patch),
+            self.document.effective_axis(patch),
+            about,
+            axis.points[about],
+            complex(axis.tangents[about]) * turn,
+            mirrored=self.document.patch(patch).mirrored,
+            unit=self.derived.unit(self.document, patch),
+        )
+        return self.submit(Rotate(patch, self.placement_at(patch, root)))
+
+    def bend(self, patch: str, point: int, angle: float) -> int:
+        """Turn the part of a patch from an interior axis point on by `angle` (radians, counter-clockwise here)."""
+        axis = self.document.effective_axis(patch)
+        axis.check_bend(point)
+        sign = -1.0 if self.document.patch(patch).mirrored else 1.0
+        return self.submit(Bend(patch, point, float(axis.turning_angles[point - 1]) + sign * angle))
+
+    def scale(self, patch: str, *, along: float | None = None, spread: float | None = None) -> int:
+        """Set the factors along the axis and across it (1: as painted); None leaves a factor as it is."""
+        axis = self.document.effective_axis(patch)
+        return self.submit(Scale(patch, along or axis.along, spread or axis.spread))
+
+    def mirror(self, patch: str, mirrored: bool | None = None) -> int:
+        """Turn a patch into its mirror image about its first direction, or back."""
+        now = self.document.patch(patch).mirrored
+        return self.submit(Mirror(patch, not now if mirrored is None else mirrored))
+
+    def transfer(
+        self,
+        patch: str,
+        surface: str,
+        point: SurfacePoints,
+        *,
+        heading: complex | None = None,
+        direction: Any = None,
+        name: str | None = None,
+        mirrored: bool = True,
+    ) -> str:
+        """Copy a patch onto a surface at a point; answers the name of the copy, which shares the shape.
+
+        mirrored: as the mirror image of the patch, as contact wants it. Onto the same surface say False.
+        """
+        return self.transfer_tree(
+            patch, surface, point, heading=heading, direction=direction,
+            names=None if name is None else {patch: name}, mirrored=mirrored, descendants=False,
+        )[patch]  # fmt: skip
+
+    def transfer_tree(
+        self,
+        patch: str,
+        surface: str,
+        point: SurfacePoints,
+        *,
+        heading: complex | None = None,
+        direction: Any = None,
+        names: dict[str, str] | None = None,
+        mirrored: bool = True,
+        descendants: bool = True,
+    ) -> dict[str, str]:
+        """Copy a patch and all that hangs on it, in one go; answers the copies' names by the names copied."""
+        document = self.document
+        target = document.surface(surface)
+        root = self.root_at(surface, point, heading, direction)
+        units = document.surface(document.patch(patch).surface).meters_per_unit / target.meters_per_unit
+        copies: dict[str, Patch] = {}
+        taken = dict.fromkeys(document.patches)
+        for name in (patch, *(document.descendants(patch) if descendants else ())):
+            source = document.patch(name)
+            wanted = (names or {}).get(name)
+            new = wanted or document.free_name(f"{name}.{surface}", taken)
+            taken[new] = None
+            copies[name] = replace(
+                source,
+                name=new,
+                surface=surface,
+                placement=root if name == patch else _copied_link(source, copies, mirrored, units),
+                original=False,
+                mirrored=source.mirrored != mirrored,
+                turns=source.turns if not source.original else (),
+                along=source.along if not source.original else 1.0,
+                spread=source.spread if not source.original else 1.0,
+            )
+        self.submit(Transfer(tuple(copies.values())))
+        return {name: copy.name for name, copy in copies.items()}
+
+    def symmetric_copy(
+        self, patch: str, *, normal: Any = (1.0, 0.0, 0.0), offset: float = 0.0, name: str | None = None
+    ) -> str:
+        """Copy a patch across a mirror plane of its surface (points x with normal . x = offset)."""
+        surface = self.document.patch(patch).surface
+        root, _ = mirrored_root(self.mesh(surface), self.root(patch), normal, offset)
+        return self.transfer(patch, surface, root.point(), heading=root.heading, name=name)
+
+    def link(self, child: str, parent: str, *, parent_point: int = 0, own_point: int = 0) -> int:
+        """Hang a patch on a parent, by the geodesic between two axis points, where both are now."""
+        for name in (child, parent):
+            self.document.patch(name)
+        if child == parent or child in self.document.ancestors(parent):
+            raise CommandRejected(f"{child!r} cannot hang on {parent!r}: that one hangs on it already.")
+        if self.document.patch(child).surface != self.document.patch(parent).surface:
+            raise CommandRejected(f"{child!r} and {parent!r} lie on different surfaces; a link is a path on one.")
+        axis = self.axis(child)
+        if not 0 <= own_point < len(axis):
+            raise InvalidInput(f"the axis of {child!r} has {len(axis)} points, but point {own_point} came.")
+        link = link_to(
+            self.mesh_of(child),
+            parent,
+            self.axis(parent),
+            axis.points[own_point],
+            complex(axis.tangents[own_point]),
+            parent_point=parent_point,
+            own_point=own_point,
+        )
+        return self.submit(LinkPatch(child, link))
+
+    def unlink(self, child: str) -> int:
+        """Take a patch off its parent; it stays where it is."""
+        return self.submit(Unlink(child, self.root(child)))
+
+
+def _copied_link(source: Patch, copies: dict[str, Patch], mirrored: bool, units: float) -> Root | Link:
+    """The link of a copied child: to its parent's copy, mirrored with it, in the target's units."""
+    link = source.placement
+    if not isinstance(link, Link):
+        raise InvalidInput(f"{source.name!r} hangs on nothing.")
+    link = replace(link, parent=copies[link.parent].name).scaled(units)
+    return link.mirrored() if mirrored else link
