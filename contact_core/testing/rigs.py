@@ -7,8 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import JointFreedom, Rig
+from contact_core.pose.body import Body, PairedPoints, manipulator_length
+from contact_core.pose.chart import Chart
+from contact_core.pose.problem import PoseProblem
+from contact_core.pose.rig import JointFreedom, Pose, Rig, skin
+from contact_core.pose.rotations import exponential
 from contact_core.testing.meshes import grid_faces
 
 Freedom = Callable[[int], JointFreedom]
@@ -130,3 +135,46 @@ def _tube(start: FloatArray, end: FloatArray, radius: float) -> tuple[FloatArray
     points = start + along[:, None, None] * (end - start) + radius * circle
     faces = grid_faces(rings, around, wrap_columns=True)[:, ::-1]
     return points.reshape(-1, 3), faces, np.repeat(along, around)
+
+
+def planted(
+    rig: Rig, seed: int, *, contacts: int = 300, spread: float = 0.6, reach: float = 1.0, movable: bool = False
+) -> tuple[PoseProblem, FloatArray]:
+    """A problem whose answer is known: the rig, far from a copy of its own skin in a random pose, and that theta.
+
+    Angles are uniform within the limits and `spread` radians of rest; the copy stands up to `reach` manipulator
+    lengths away and turned any way. The copy's faces are flipped, so that it is a hollow that the rig fits into.
+    movable: the copy moves instead and the rig stays where it is posed.
+    """
+    random = np.random.default_rng(seed)
+    chart = Chart(rig)
+    theta = random.uniform(np.maximum(chart.lower, -spread), np.minimum(chart.upper, spread))
+    turning = chart.is_root & ~chart.is_translation & (rig.parents[chart.joint_of_dof] < 0)
+    theta[turning] = random.uniform(-1.0, 1.0, 3) * np.pi / np.sqrt(3.0)
+    theta[chart.locked] = 0.0
+    theta[chart.is_translation] = 0.0
+    away = random.normal(0.0, 1.0, 3)
+    away *= reach * manipulator_length(rig) * random.uniform() / np.linalg.norm(away)
+    theta[chart.is_translation & (rig.parents[chart.joint_of_dof] < 0)] = away
+    mold = TriangleMesh(skin(rig, chart.motion(theta).world), rig.faces[:, ::-1])
+    points = scattered_points(rig, contacts, seed)
+    pressed = SurfacePoints(points.faces, points.barycentric[:, ::-1])
+    if movable:
+        elsewhere = np.eye(4)
+        elsewhere[:3, :3] = exponential(random.normal(0.0, 1.0, (1, 3)))[0][0]
+        elsewhere[:3, 3] = random.normal(0.0, 10.0, 3)
+        posed = Pose(rig.joints, chart.local(theta))
+        bodies = (
+            Body.skinned(rig, pose=posed),
+            Body.rigid("mold", mold, world_from_surface=elsewhere, movable=True),
+        )
+        pairs = (PairedPoints("all", rig.name, points, "mold", pressed),)
+        return PoseProblem(bodies, pairs, free={"mold": ["mold"]}), theta
+    pairs = (PairedPoints("all", rig.name, points, "mold", pressed),)
+    return PoseProblem((Body.skinned(rig), Body.rigid("mold", mold)), pairs), theta
+
+
+def mean_gap(problem: PoseProblem, theta: FloatArray) -> float:
+    """Mean distance of paired points at theta, as a share of the manipulator's length."""
+    gap = problem.state(theta).vectors(problem.pairs.gap)
+    return float(np.linalg.norm(gap, axis=1).mean() / problem.manipulator_length)

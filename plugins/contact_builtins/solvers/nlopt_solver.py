@@ -42,10 +42,7 @@ class NLoptSolver:
             return stopped
         starts = starting_thetas(problem, options.candidates).values()
         first = min(starts, key=lambda theta: run.evaluate(theta)[1])
-        try:
-            return run.solution(_descend(nlopt, getattr(nlopt, algorithm), run, first, options, paper=paper))
-        except Stop:
-            return run.solution(SolveStatus.CANCELLED)
+        return run.solution(_descend(nlopt, getattr(nlopt, algorithm), run, first, options, paper=paper))
 
 
 def _descend(
@@ -53,13 +50,21 @@ def _descend(
 ) -> SolveStatus:
     problem, scale = run.problem, run.problem.scale
     lower, upper = problem.limits_of_theta
+    cancelled = False
 
     def objective(x: FloatArray, gradient: FloatArray) -> float:
+        nonlocal cancelled
+        if cancelled:  # some algorithms ask once more after being stopped
+            return run.best_value
         # NLopt rounds at bounds: what is scaled back is brought into the limits before it can become the best.
         state, value = run.evaluate(np.clip(x * scale, lower, upper))
         if gradient.size:
             gradient[:] = problem.gradient(state) * scale
-        run.iteration()
+        try:
+            run.iteration()
+        except Stop:  # an exception would be lost on its way through NLopt
+            cancelled = True
+            optimizer.force_stop()
         return value
 
     optimizer = nlopt.opt(algorithm, len(first))
@@ -73,11 +78,21 @@ def _descend(
         optimizer.set_ftol_rel(0.1 * options.tolerance)
     try:
         optimizer.optimize(np.clip(first / scale, lower / scale, upper / scale))
-    except (nlopt.RoundoffLimited, RuntimeError, ValueError) as error:  # the best pose is kept by the run
-        run.notes.append(f"NLopt ended early ({type(error).__name__}: {error}); this is the best pose it saw.")
+    except _endings(nlopt) as error:  # NLopt throws its result away; the run kept the best pose
+        if cancelled:
+            return SolveStatus.CANCELLED
+        run.notes.append(f"NLopt ended early ({type(error).__name__}); this is the best pose it saw.")
         return SolveStatus.STOPPED
+    if cancelled:
+        return SolveStatus.CANCELLED
     settled = (nlopt.SUCCESS, nlopt.FTOL_REACHED, nlopt.XTOL_REACHED, nlopt.STOPVAL_REACHED)
     return SolveStatus.CONVERGED if optimizer.last_optimize_result() in settled else SolveStatus.STOPPED
+
+
+def _endings(nlopt: ModuleType) -> tuple[type[Exception], ...]:
+    """The exceptions that end an NLopt run, which differ between its versions."""
+    names = ("ForcedStop", "RoundoffLimited", "runtime_error", "invalid_argument")
+    return (RuntimeError, ValueError, *(getattr(nlopt, name) for name in names if hasattr(nlopt, name)))
 
 
 def _settings(nlopt: ModuleType, options: SolveOptions) -> tuple[str, bool]:

@@ -1,0 +1,70 @@
+"""Every registered solver keeps the solver contract."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import pytest
+
+from contact_builtins.solvers.nlopt_solver import NLoptSolver
+from contact_builtins.solvers.stepwise import MultiStartSolver, ProgressiveSolver, StagedSolver
+from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
+from contact_core.pose.solver import PoseSolver, SolveOptions
+from contact_core.testing.solver_contract import SolverContract
+
+
+class TestLevenbergMarquardt(SolverContract):
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return LevenbergMarquardt()
+
+
+class TestStaged(SolverContract):
+    cannot: ClassVar[dict[str, str]] = {"budget": "the iterations are counted per stage"}
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return StagedSolver()
+
+
+class TestProgressive(SolverContract):
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return ProgressiveSolver()
+
+
+class TestMultiStart(SolverContract):
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return MultiStartSolver()
+
+    @pytest.fixture
+    def options(self) -> SolveOptions:
+        return SolveOptions(more={"starts": 4})
+
+
+class TestNLopt(SolverContract):
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        pytest.importorskip("nlopt")
+        return NLoptSolver()
+
+    @pytest.fixture
+    def options(self) -> SolveOptions:
+        return SolveOptions(max_iterations=1000)
+
+
+class TestNLoptPaper(SolverContract):
+    subject: ClassVar[str] = "NLopt as in the paper"
+    cannot: ClassVar[dict[str, str]] = {
+        "precision": "100 evaluations of LD_MMA on the unsquared form do not arrive"
+    }
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        pytest.importorskip("nlopt")
+        return NLoptSolver()
+
+    @pytest.fixture
+    def options(self) -> SolveOptions:
+        return SolveOptions(more={"preset": "paper"})
