@@ -10,6 +10,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contact_core.geometry.exact_geodesics import Geodesic as Geodesic
+    from contact_core.geometry.exact_geodesics import LogMap as LogMap
+    from contact_core.geometry.exact_geodesics import exact_geodesic as exact_geodesic
+    from contact_core.geometry.exact_geodesics import log_map as log_map
+    from contact_core.geometry.exact_geodesics import parallel_transport as parallel_transport
     from contact_core.geometry.mesh import TriangleMesh as TriangleMesh
     from contact_core.geometry.surface_point import SurfacePoints as SurfacePoints
     from contact_core.geometry.topology import Topology as Topology
@@ -18,6 +23,11 @@ if TYPE_CHECKING:
     from contact_core.geometry.tracing import trace_geodesic as trace_geodesic
 
 _HOME_OF_NAME = {
+    "Geodesic": "exact_geodesics",
+    "LogMap": "exact_geodesics",
+    "exact_geodesic": "exact_geodesics",
+    "log_map": "exact_geodesics",
+    "parallel_transport": "exact_geodesics",
     "TriangleMesh": "mesh",
     "SurfacePoints": "surface_point",
     "Topology": "topology",

@@ -1,0 +1,171 @@
+"""Exact polyhedral geodesics: the log map of many targets in one propagation, and single shortest paths.
+
+Source: Mitchell, Mount and Papadimitriou 1987; Chen and Han 1990; Xin and Wang 2009. The paper's ExactGeodesic,
+InitialDirection, EndingDirection and ClosestPoints are fields of these results.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import ComplexArray, FloatArray, IntArray
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.topology import Topology
+from contact_core.geometry.tracing import require_on_surface, trace_chains
+from contact_core.geometry.workspace import Workspace
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LogMap:
+    """Shortest ways from the nearest of several sources to each of k targets.
+
+    A shortest way runs straight until it bends round a saddle vertex or a reflex vertex of the boundary, so it is a
+    chain: a first leg, then legs that turn and run on. `trace_chains` walks it again and ends at the target.
+
+    anchor: (k,) index of the nearest source, -1 where none is in reach.
+    distance: (k,) length of the whole way, inf where none.
+    coordinates: (k,) complex; absolute value = distance, argument = initial direction in the source's tangent
+    frame.
+    headings: (k,) unit complex, forward direction at the target in its tangent frame (1 where nothing is walked).
+    first_leg: (k,) complex tangent vector of the straight beginning; equal to coordinates where the way never
+    bends.
+    offsets: (k + 1,) rows offsets[i]:offsets[i + 1] of the two below are the further legs of way i.
+    turning_angles, lengths: (c,) radians counter-clockwise from straight on (rescaled at the vertex), surface
+    units.
+    pops: windows and vertices that the search took from its heap: the work done.
+    Where no source is in reach, coordinates and first_leg are 0.
+    """
+
+    anchor: IntArray
+    distance: FloatArray
+    coordinates: ComplexArray
+    headings: ComplexArray
+    first_leg: ComplexArray
+    offsets: IntArray
+    turning_angles: FloatArray
+    lengths: FloatArray
+    pops: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Geodesic:
+    """One shortest path.
+
+    points: (c,) surface points: the start, each edge or vertex that it crosses, the end. length: surface units.
+    heading, ending_heading: unit complex, forward directions at start and end in their tangent frames.
+    log: the log map (one target) that it was traced from.
+    """
+
+    points: SurfacePoints
+    length: float
+    heading: complex
+    ending_heading: complex
+    log: LogMap
+
+    def transport(self, vectors: Any) -> ComplexArray:
+        """Parallel transport of tangent vectors (k,), complex, from the start to the end."""
+        return np.asarray(vectors, np.complex128) * self._turn
+
+    @property
+    def _turn(self) -> complex:
+        """A carried vector keeps its angle to the path, and does not turn with it where it bends."""
+        bends = np.exp(-1j * self.log.turning_angles.sum())
+        return complex(self.ending_heading / self.heading * bends)
+
+
+def log_map(
+    mesh: TriangleMesh, sources: SurfacePoints, targets: SurfacePoints, max_distance: float | None = None
+) -> LogMap:
+    """The log map of k targets from the nearest of s >= 1 sources, exact, in one propagation for all of them.
+
+    The search ends as soon as every target is final, and never goes beyond max_distance (surface units): its time
+    and memory depend on that region, not on the mesh. A target on another component costs a search of the whole
+    component unless max_distance is given. Raises InvalidInput, and NotManifold where the search meets a place that
+    is not.
+    """
+    from contact_core.geometry import log_map_kernels as kernels
+
+    limit = _limit(max_distance)
+    if not len(sources):
+        raise InvalidInput("a log map needs at least one source, but none came.")
+    topology = Topology.of(mesh)
+    require_on_surface(topology, sources, "sources")
+    require_on_surface(topology, targets, "targets")
+    count = len(targets)
+    anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
+    distance, headings = np.empty(count), np.empty(count, np.complex128)
+    target_floats, target_integers = np.empty((count, 12)), np.empty((count, 6), np.int64)
+    tail, twin, shape = topology.tail, topology.twin, topology.shape
+    first, angle_sum, kind = topology.first, topology.angle_sum, topology.kind
+    with Workspace.lent(mesh) as work:
+        while True:
+            status, element = kernels.search(
+                sources.faces, sources.barycentric, targets.faces, targets.barycentric, limit, work.epoch,
+                tail, twin, shape, first, angle_sum, kind,
+                work.reach, work.leg, work.origin, work.claim, work.listed,
+                work.floats, work.integers, work.keys, work.items, work.state, target_floats, target_integers,
+            )  # fmt: skip
+            if status != kernels.NO_ROOM:
+                break
+            work.grow()
+        if status == kernels.MET_BLOCKED_EDGE:
+            raise topology.refuse_halfedge(element, "a log map")
+        if status == kernels.MET_BLOCKED_VERTEX:
+            raise topology.refuse_vertex(element, "a log map")
+        bends = kernels.read_targets(
+            limit, work.epoch, tail, twin, shape, angle_sum, kind, work.reach, work.leg, work.origin,
+            target_floats, target_integers, anchor, distance, headings.view(np.float64).reshape(-1, 2), offsets,
+        )  # fmt: skip
+        first_leg = np.empty(count, np.complex128)
+        turning_angles, lengths = np.empty(bends), np.empty(bends)
+        kernels.read_chains(
+            sources.faces, sources.barycentric, tail, twin, shape, angle_sum, kind, work.leg, work.origin,
+            target_floats, target_integers, anchor, offsets,
+            first_leg.view(np.float64).reshape(-1, 2), turning_angles, lengths,
+        )  # fmt: skip
+        pops = work.pops
+    coordinates = first_leg
+    if bends:
+        coordinates = first_leg.copy()
+        bent = offsets[1:] > offsets[:-1]
+        coordinates[bent] *= distance[bent] / np.abs(first_leg[bent])
+    for array in (anchor, distance, coordinates, headings, first_leg, offsets, turning_angles, lengths):
+        array.setflags(write=False)
+    return LogMap(anchor, distance, coordinates, headings, first_leg, offsets, turning_angles, lengths, pops)
+
+
+def exact_geodesic(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoints) -> Geodesic:
+    """The shortest path between two points (batches of one). Raises InvalidInput where no path joins them."""
+    for name, point in (("start", start), ("end", end)):
+        if len(point) != 1:
+            raise InvalidInput(f"a geodesic has one {name} point, but {len(point)} came.")
+    log = log_map(mesh, start, end)
+    if log.anchor[0] < 0:
+        raise InvalidInput("no path joins the two points: they lie on parts of the surface that are not connected.")
+    way = trace_chains(mesh, start, log.first_leg, log.offsets, log.turning_angles, log.lengths, polyline=True)
+    assert way.polylines is not None
+    leg = complex(log.first_leg[0])
+    heading = leg / abs(leg) if leg else 1.0 + 0.0j
+    return Geodesic(way.polylines[0], float(log.distance[0]), heading, complex(log.headings[0]), log)
+
+
+def parallel_transport(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoints, vectors: Any) -> ComplexArray:
+    """Tangent vectors (k,), complex, carried from one point to another along the shortest geodesic.
+
+    Source: Sharp, Soliman and Crane 2019, section 5.2: angles to the geodesic stay. Raises as exact_geodesic.
+    """
+    return exact_geodesic(mesh, start, end).transport(vectors)
+
+
+def _limit(max_distance: float | None) -> float:
+    if max_distance is None:
+        return float("inf")
+    limit = float(max_distance)
+    if not limit >= 0.0:
+        raise InvalidInput(f"max_distance must be a length of at least 0, but is {max_distance}.")
+    return limit

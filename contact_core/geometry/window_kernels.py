@@ -1,0 +1,363 @@
+"""Kernels of the exact log map: continuous Dijkstra with windows (Mitchell, Mount and Papadimitriou 1987).
+
+A window is light that enters a face through an interval [b0, b1] of halfedge h, straight from a root: a source, or
+a saddle or boundary vertex that a path bends round. It keeps the root's position S in the frame of h (S below the
+edge) and a rotation from that frame to the root's, so that length and initial direction of the way to any point p
+of the face are |p - S| and (p - S) * rotation. Windows leave a heap in order of distance (Chen and Han 1990,
+improved by Xin and Wang 2009): a window whose cone holds the apex splits in two, but of all windows that enter
+through h only the one that is nearest to the apex keeps both children (`claim`); and a window that the vertices
+round it outdo is dropped.
+
+Work arrays belong to a mesh and are never cleared: what carries an older epoch counts as empty, so a query touches
+no more memory than its region has. Indices: see `workspace.Workspace`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.tangent_kernels import (
+    ON_EDGE,
+    ON_FACE,
+    PI,
+    angle_round_vertex,
+    corner_angle,
+    direction_in_face,
+)
+from contact_core.geometry.topology_kernels import (
+    BLOCKED,
+    BLOCKED_VERTEX,
+    BOUNDARY,
+    BOUNDARY_VERTEX,
+    following,
+    preceding,
+)
+
+# Columns of the float record of a window
+B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING = (
+    constant(0), constant(1), constant(2), constant(3), constant(4), constant(5), constant(6), constant(7),
+    constant(8),
+)  # fmt: skip
+# Columns of its integer record. root: source s as -1 - s, or a vertex. wedge: the halfedge in whose frame
+# directions at the root are given. side: which child of its parent it is. A free record links to the next one in
+# HALFEDGE.
+HALFEDGE, ROOT, WEDGE, SIDE = constant(0), constant(1), constant(2), constant(3)
+ONLY_CHILD, LEFT_CHILD, RIGHT_CHILD = constant(0), constant(1), constant(2)
+# Entries of state
+HEAP_SIZE, FREE, USED, POPS, WINDOWS, OVERFLOW = (
+    constant(0), constant(1), constant(2), constant(3), constant(4), constant(5),
+)  # fmt: skip
+
+EXCESS = 1e-11  # radians by which a vertex must exceed a flat one for paths to bend round it
+GRAZING = 1e-11  # radians by which a ray may miss a vertex or a target and still count as meeting it
+SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
+
+
+@kernel
+def heap_push(key: float, item: int, keys: FloatArray, items: IntArray, state: IntArray) -> None:
+    """Insert into the binary min-heap; sets OVERFLOW when it is full."""
+    i = state[HEAP_SIZE]
+    if i >= len(keys):
+        state[OVERFLOW] = 1
+        return
+    state[HEAP_SIZE] = i + 1
+    while i > 0:
+        parent = (i - 1) >> 1
+        if keys[parent] <= key:
+            break
+        keys[i], items[i] = keys[parent], items[parent]
+        i = parent
+    keys[i], items[i] = key, item
+
+
+@kernel
+def heap_pop(keys: FloatArray, items: IntArray, state: IntArray) -> int:
+    """Remove the item of the smallest key."""
+    top = items[0]
+    size = state[HEAP_SIZE] - 1
+    state[HEAP_SIZE] = size
+    key, item = keys[size], items[size]
+    i = 0
+    while True:
+        child = 2 * i + 1
+        if child >= size:
+            break
+        if child + 1 < size and keys[child + 1] < keys[child]:
+            child += 1
+        if keys[child] >= key:
+            break
+        keys[i], items[i] = keys[child], items[child]
+        i = child
+    keys[i], items[i] = key, item
+    return top
+
+
+@kernel
+def distance_at(v: int, epoch: float, reach: FloatArray) -> float:
+    """The distance found so far at vertex v."""
+    return reach[v, 1] if reach[v, 0] == epoch else math.inf
+
+
+@kernel
+def bends_paths(v: int, angle_sum: FloatArray, kind: IntArray) -> bool:
+    """Whether shortest paths can bend round vertex v. A blocked vertex counts: it is refused when met."""
+    if kind[v] == BOUNDARY_VERTEX:
+        return angle_sum[v] > PI + EXCESS
+    return kind[v] == BLOCKED_VERTEX or angle_sum[v] > 2.0 * PI + EXCESS
+
+
+@kernel
+def lower(
+    v: int, distance: float, root: int, wedge: int, zx: float, zy: float, corner: int, bx: float, by: float,
+    bound: float, epoch: float, shape: FloatArray, angle_sum: FloatArray, kind: IntArray,
+    reach: FloatArray, leg: FloatArray, origin: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
+) -> None:  # fmt: skip
+    """Record a shorter way to v: last leg (zx, zy) in the wedge's frame, way back (bx, by) in the corner's."""
+    if reach[v, 0] == epoch and origin[v, 2] == 1:  # a vertex that was a root already keeps its way
+        return
+    reach[v, 0], reach[v, 1] = epoch, distance
+    leg[v, 0], leg[v, 1], leg[v, 2] = zx, zy, angle_round_vertex(corner, bx, by, shape)
+    origin[v, 0], origin[v, 1], origin[v, 2] = root, wedge, 0
+    if distance <= bound and bends_paths(v, angle_sum, kind):
+        heap_push(distance, -1 - v, keys, items, state)
+
+
+@kernel
+def cast(
+    edge: int, b0: float, b1: float, sx: float, sy: float, sigma: float, cos: float, sin: float,
+    root: int, wedge: int, side: int, split_distance: float, split_crossing: float,
+    bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray, reach: FloatArray,
+    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
+) -> None:  # fmt: skip
+    """Let a window through `edge` of the face that it leaves, unless it is empty, off the surface, too far, or
+    outdone.
+
+    Interval, root position and rotation are given in the frame of the edge's other side.
+    """
+    h = twin[edge]
+    length = shape[edge, 0]
+    b0, b1, sy = max(b0, 0.0), min(b1, length), min(sy, 0.0)
+    if not b1 > b0 or h == BOUNDARY:
+        return
+    to_b0, to_b1 = math.hypot(b0 - sx, sy), math.hypot(b1 - sx, sy)
+    key = sigma + (to_b0 if sx <= b0 else (to_b1 if sx >= b1 else -sy))
+    if key > bound:
+        return
+    d0, d1 = (sigma + to_b0) * SURELY, (sigma + to_b1) * SURELY
+    following_edge = following(edge)
+    left, right = tail[following_edge], tail[edge]  # the other side runs the other way
+    if distance_at(left, epoch, reach) + b1 < d1 or distance_at(right, epoch, reach) + (length - b0) < d0:
+        return
+    if side != ONLY_CHILD:
+        from_apex = distance_at(tail[preceding(edge)], epoch, reach)
+        x, y = length - shape[edge, 1], shape[edge, 2]
+        if side == LEFT_CHILD:  # the third vertex of the face lies right of the window
+            if from_apex + math.hypot(b0 - x, y) < d0:
+                return
+        elif from_apex + math.hypot(b1 - x, y) < d1:
+            return
+    w = state[FREE]
+    if w >= 0:
+        state[FREE] = integers[w, HALFEDGE]
+    else:
+        w = state[USED]
+        if w >= len(integers):
+            state[OVERFLOW] = 1
+            return
+        state[USED] = w + 1
+    record = floats[w]
+    record[B0], record[B1], record[SX], record[SY], record[SIGMA] = b0, b1, sx, sy, sigma
+    record[COS], record[SIN] = cos, sin
+    record[SPLIT_DISTANCE], record[SPLIT_CROSSING] = split_distance, split_crossing
+    # a blocked edge waits in the heap like any other: it is refused only when the search really gets there
+    integers[w, HALFEDGE] = h if h != BLOCKED else -1 - edge
+    integers[w, ROOT], integers[w, WEDGE], integers[w, SIDE] = root, wedge, side
+    state[WINDOWS] += 1
+    heap_push(key, w, keys, items, state)
+
+
+@kernel
+def propagate(
+    w: int, bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray,
+    angle_sum: FloatArray, kind: IntArray, reach: FloatArray, leg: FloatArray, origin: IntArray, claim: FloatArray,
+    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
+) -> None:  # fmt: skip
+    """Carry window w across its face: to the apex if its cone holds it, and through the other two edges."""
+    record = floats[w]
+    b0, b1, sx, sy, sigma = record[B0], record[B1], record[SX], record[SY], record[SIGMA]
+    cos, sin = record[COS], record[SIN]
+    h, root, wedge = integers[w, HALFEDGE], integers[w, ROOT], integers[w, WEDGE]
+    to_left, to_right = preceding(h), following(h)
+    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    left_length, right_length = shape[to_left, 0], shape[to_right, 0]
+    rx, ry = ax - sx, ay - sy  # from the root to the apex
+    beyond_left = (b0 - sx) * ry + sy * rx  # positive: the apex lies left of the leftmost ray
+    beyond_right = -((b1 - sx) * ry + sy * rx)
+    span = GRAZING * (abs(rx) + ry)
+    left_ray, right_ray = abs(b0 - sx) - sy, abs(b1 - sx) - sy
+    left, right = beyond_left <= 0.0, beyond_right <= 0.0
+    split_distance, split_crossing = -1.0, 0.0
+    if beyond_left <= span * left_ray and beyond_right <= span * right_ray:
+        apex = tail[to_left]
+        distance = sigma + math.hypot(rx, ry)
+        sharp = left and right
+        if distance < distance_at(apex, epoch, reach) * (1.0 if sharp else SURELY):
+            cx, cy = -ax / left_length, -ay / left_length
+            lower(
+                apex, distance, root, wedge, rx * cos - ry * sin, rx * sin + ry * cos,
+                to_left, -rx * cx - ry * cy, -ry * cx + rx * cy,
+                bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
+            )  # fmt: skip
+        if sharp:  # one angle, one split
+            crossing = sx - rx * sy / ry if ry > 0.0 else sx
+            split_distance, split_crossing = distance, crossing
+            if claim[h, 0] != epoch or distance < claim[h, 1]:
+                claim[h, 0], claim[h, 1], claim[h, 2] = epoch, distance, crossing
+            elif distance * SURELY > claim[h, 1]:
+                left = crossing < claim[h, 2] + GRAZING * length
+                right = crossing > claim[h, 2] - GRAZING * length
+    if left:
+        ux, uy = ax / left_length, ay / left_length
+        t0 = 0.0 if b0 == 0.0 else left_length * sy * b0 / (ax * sy + ay * (b0 - sx))
+        t1 = left_length if beyond_right <= 0.0 else left_length * sy * b1 / (ax * sy + ay * (b1 - sx))
+        cast(
+            to_left, t0, t1, sx * ux + sy * uy, sy * ux - sx * uy, sigma, cos * ux - sin * uy, cos * uy + sin * ux,
+            root, wedge, LEFT_CHILD, split_distance, split_crossing,
+            bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
+        )  # fmt: skip
+    if right:  # the same, seen in a mirror that puts the head at the origin
+        fx, fs = length - ax, length - sx
+        ux, uy = fx / right_length, -ay / right_length
+        c0, c1 = length - b0, length - b1
+        t0 = 0.0 if beyond_left <= 0.0 else right_length - right_length * sy * c0 / (fx * sy + ay * (c0 - fs))
+        t1 = right_length if c1 == 0.0 else right_length - right_length * sy * c1 / (fx * sy + ay * (c1 - fs))
+        cast(
+            to_right, t0, t1, -rx * ux - ry * uy, -ry * ux + rx * uy, sigma, cos * ux - sin * uy, cos * uy + sin *
+            ux, root, wedge, RIGHT_CHILD, split_distance, split_crossing,
+            bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
+        )  # fmt: skip
+
+
+@kernel
+def lost_its_claim(
+    w: int, epoch: float, twin: IntArray, claim: FloatArray, floats: FloatArray, integers: IntArray
+) -> bool:
+    """Whether, since w was cast, a window nearer to the apex took the side of the face that w came through."""
+    split_distance = floats[w, SPLIT_DISTANCE]
+    if split_distance < 0.0:
+        return False
+    edge = twin[integers[w, HALFEDGE]]
+    side = integers[w, SIDE]
+    entry = following(edge) if side == LEFT_CHILD else preceding(edge)
+    if claim[entry, 1] >= split_distance * SURELY:
+        return False
+    gap = floats[w, SPLIT_CROSSING] - claim[entry, 2]
+    return gap > GRAZING if side == LEFT_CHILD else gap < -GRAZING
+
+
+@kernel
+def emit_shadow(
+    v: int, bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray, first: IntArray,
+    angle_sum: FloatArray, kind: IntArray, reach: FloatArray, leg: FloatArray, origin: IntArray,
+    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
+) -> None:  # fmt: skip
+    """Cast windows from v, reached from angle leg[v, 2], into its shadow: half a turn or more off, both ways."""
+    origin[v, 2] = 1
+    sigma, back, total = reach[v, 1], leg[v, 2], angle_sum[v]
+    rim = kind[v] == BOUNDARY_VERTEX
+    low, high = 0.0 if rim else back + PI - total, back - PI
+    low_too, high_too = back + PI, total if rim else back + total - PI
+    h = first[v]
+    while True:
+        opposite, backward = following(h), preceding(h)
+        corner = corner_angle(h, shape)
+        for reversed_edge in (False, True):
+            x, y = (shape[h, 1], shape[h, 2]) if reversed_edge else (shape[h, 0], 0.0)
+            arrival = backward if reversed_edge else opposite
+            neighbour = tail[arrival]
+            distance = sigma + (shape[backward, 0] if reversed_edge else shape[h, 0])
+            if distance < distance_at(neighbour, epoch, reach):
+                if reversed_edge:
+                    bx, by = 1.0, 0.0
+                else:
+                    ux, uy = direction_in_face(opposite, shape)
+                    vx, vy = direction_in_face(h, shape)
+                    bx, by = -vx * ux - vy * uy, -vy * ux + vx * uy
+                lower(
+                    neighbour, distance, v, h, x, y, arrival, bx, by,
+                    bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
+                )  # fmt: skip
+        start = shape[h, 3]
+        for part in range(2):
+            a0 = max((low if part == 0 else low_too) - start, 0.0)
+            a1 = min((high if part == 0 else high_too) - start, corner)
+            if a1 > a0:
+                cast_from_corner(
+                    h, a0, a1, corner, sigma, v,
+                    bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
+                )  # fmt: skip
+        h = twin[backward]
+        if h < 0 or h == first[v]:
+            break
+
+
+@kernel
+def cast_from_corner(
+    h: int, a0: float, a1: float, corner: float, sigma: float, root: int,
+    bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray, reach: FloatArray,
+    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
+) -> None:  # fmt: skip
+    """Cast a window from the tail of h, between angles a0 < a1 from h, through the opposite edge."""
+    opposite = following(h)
+    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    size = shape[opposite, 0]
+    b0, b1 = 0.0, size  # from the apex to the head
+    if a0 > 0.0:
+        sin, cos = math.sin(a0), math.cos(a0)
+        b1 = size * (1.0 - length * sin / (cos * ay + sin * (length - ax)))
+    if a1 < corner:
+        sin, cos = math.sin(a1), math.cos(a1)
+        b0 = size * (1.0 - length * sin / (cos * ay + sin * (length - ax)))
+    ux, uy = (length - ax) / size, -ay / size
+    cast(
+        opposite, b0, b1, -ax * ux - ay * uy, -ay * ux + ax * uy, sigma, ux, uy,
+        root, h, ONLY_CHILD, -1.0, 0.0,
+        bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
+    )  # fmt: skip
+
+
+@kernel
+def emit_source(
+    base: int, x: float, y: float, on: int, root: int, bound: float, epoch: float,
+    tail: IntArray, twin: IntArray, shape: FloatArray, angle_sum: FloatArray, kind: IntArray,
+    reach: FloatArray, leg: FloatArray, origin: IntArray,
+    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
+) -> None:  # fmt: skip
+    """Light a face from the source at (x, y) in the frame of halfedge `base`: its corners, and windows out of it.
+
+    on: what the source lies on; the face, `base`, or the tail of `base`. No window leaves through its own edges.
+    """
+    h = base
+    cos, sin = 1.0, 0.0  # from the frame of h to that of base
+    for side in range(3):
+        distance = math.hypot(x, y)
+        v = tail[h]
+        if distance < distance_at(v, epoch, reach):
+            lower(
+                v, distance, root, base, -x * cos + y * sin, -x * sin - y * cos, h, x, y,
+                bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
+            )  # fmt: skip
+        length = shape[h, 0]
+        if side == 1 or on == ON_FACE or (side == 2 and on == ON_EDGE):
+            cast(
+                h, 0.0, length, length - x, -y, 0.0, -cos, -sin, root, base, ONLY_CHILD, -1.0, 0.0,
+                bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
+            )  # fmt: skip
+        h_next = following(h)
+        ux, uy = (shape[h, 1] - length) / shape[h_next, 0], shape[h, 2] / shape[h_next, 0]
+        x -= length
+        x, y = x * ux + y * uy, y * ux - x * uy
+        cos, sin = cos * ux - sin * uy, cos * uy + sin * ux
+        h = h_next
