@@ -15,7 +15,7 @@ from contact_core.arrays import ComplexArray, FloatArray, IntArray, frozen
 from contact_core.contact.placement import Root
 from contact_core.contact.shape import AxisShape
 from contact_core.errors import InvalidInput
-from contact_core.geometry.exact_geodesics import log_map
+from contact_core.geometry.exact_geodesics import LogMap, log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tracing import trace_chains
@@ -151,10 +151,10 @@ def root_from_point(
 
 
 def _segments(
-    mesh: TriangleMesh, start: SurfacePoints, leg: object, dense: bool
+    mesh: TriangleMesh, start: SurfacePoints, leg: LogMap, dense: bool
 ) -> tuple[list[float], list[float]]:
     """Lengths of the segments of one geodesic, and the turns between them."""
-    first, turns, rest = leg.first_leg, leg.turning_angles, leg.lengths  # type: ignore[attr-defined]
+    first, turns, rest = leg.first_leg, leg.turning_angles, leg.lengths
     knots = np.concatenate([[abs(complex(first[0]))], rest])  # lengths of the straight legs
     if not dense:
         return knots.tolist(), turns.tolist()

@@ -1,0 +1,133 @@
+"""The contract of commands. Subclass it and give the fixture `cases`: documents, each with commands for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contact_core.document.document import ContactDocument
+from contact_core.document.schema import dump_document, inconsistencies
+from contact_core.edit.command import (
+    Command,
+    apply_command,
+    command_from_json,
+    command_to_json,
+    registered_commands,
+)
+from contact_core.edit.history import History
+from contact_core.errors import CommandRejected
+from contact_core.testing.contract import Contract
+
+
+@dataclass(frozen=True, eq=False)
+class CommandCase:
+    """A document, a command that applies to it, and one to try after it (a second step of the same drag)."""
+
+    document: ContactDocument
+    command: Command
+    later: Command | None = None
+
+
+class CommandContract(Contract):
+    """Fixture: `cases`, a sequence of CommandCase."""
+
+    about, letter = "command", "C"
+
+    def test_c01_is_a_registered_value(self, cases: Sequence[CommandCase]) -> None:
+        """Is a frozen dataclass, registered under its json_id."""
+        assert cases, "no case to try"
+        for case in cases:
+            kind: Any = type(case.command)
+            parameters = getattr(kind, "__dataclass_params__", None)
+            assert parameters is not None and parameters.frozen, f"{kind.__name__} can be changed"
+            assert registered_commands().get(kind.json_id) is kind, f"{kind.json_id!r} is not registered"
+
+    def test_c02_has_a_label(self, cases: Sequence[CommandCase]) -> None:
+        """Says in the artist's words what it does, on one line."""
+        for case in cases:
+            label = case.command.label()
+            assert label.strip() == label != "" and "\n" not in label, repr(label)
+
+    def test_c03_leaves_its_input_alone(self, cases: Sequence[CommandCase]) -> None:
+        """Applying it leaves the document bit-identical, and holds no array that can be written to."""
+        for case in cases:
+            before = dump_document(case.document)
+            apply_command(case.command, case.document)
+            assert dump_document(case.document) == before, command_to_json(case.command)
+            assert not writable_arrays(case.command), f"{case.command.json_id} holds writable arrays"
+
+    def test_c04_result_is_immutable_and_consistent(self, cases: Sequence[CommandCase]) -> None:
+        """The document that it makes contradicts itself nowhere and holds no array that can be written to."""
+        for case in cases:
+            after = apply_command(case.command, case.document)
+            assert list(inconsistencies(after)) == [], command_to_json(case.command)
+            assert not writable_arrays(after)
+
+    def test_c05_is_deterministic(self, cases: Sequence[CommandCase]) -> None:
+        """Applied twice to one document it makes equal documents."""
+        for case in cases:
+            once, again = (dump_document(apply_command(case.command, case.document)) for _ in range(2))
+            assert once == again, command_to_json(case.command)
+
+    def test_c06_undo_returns_the_same_object(self, cases: Sequence[CommandCase]) -> None:
+        """Undo gives back the very same document object, and redo the very same result."""
+        for case in cases:
+            history = History(case.document)
+            after = history.do(case.command).after
+            history.undo()
+            assert history.document is case.document
+            history.redo()
+            assert history.document is after
+
+    def test_c07_replays_from_json(self, cases: Sequence[CommandCase]) -> None:
+        """Stored as JSON and read back, it is the same command and makes an equal document."""
+        for case in cases:
+            stored = command_to_json(case.command)
+            again = command_from_json(stored)
+            assert type(again) is type(case.command)
+            assert command_to_json(again) == stored
+            wanted = dump_document(apply_command(case.command, case.document))
+            assert dump_document(apply_command(again, case.document)) == wanted, stored
+
+    def test_c08_merges_into_both(self, cases: Sequence[CommandCase]) -> None:
+        """Where it merges with a later command, the merged one equals the one after the other."""
+        for case in cases:
+            merged = case.command.merge(case.later) if case.later is not None else None
+            if case.later is None or merged is None:
+                continue
+            one_by_one = apply_command(case.later, apply_command(case.command, case.document))
+            at_once = apply_command(merged, case.document)
+            assert dump_document(at_once) == dump_document(one_by_one), command_to_json(merged)
+
+    def test_c09_rejects_in_words(self, cases: Sequence[CommandCase]) -> None:
+        """On a document that it does not fit, it raises CommandRejected with a sentence, or it fits after all."""
+        empty = ContactDocument()
+        for case in cases:
+            try:
+                apply_command(case.command, empty)
+            except CommandRejected as error:
+                assert len(str(error).split()) >= 3, str(error)
+            except Exception as error:  # the clause is that this never happens
+                pytest.fail(f"{case.command.json_id} raised {type(error).__name__}: {error}")
+            assert dump_document(empty) == dump_document(ContactDocument())
+
+
+def writable_arrays(value: Any, seen: set[int] | None = None) -> list[str]:
+    """Where in a value arrays hide that can be written to."""
+    seen = set() if seen is None else seen
+    if id(value) in seen:
+        return []
+    seen.add(id(value))
+    if isinstance(value, np.ndarray):
+        return [f"array of shape {value.shape}"] if value.flags.writeable else []
+    if is_dataclass(value) and not isinstance(value, type):
+        inner: list[Any] = [getattr(value, item.name) for item in fields(value)]
+    elif hasattr(value, "values"):
+        inner = list(value.values())
+    else:
+        inner = list(value) if isinstance(value, (tuple, list)) else []
+    return [found for item in inner for found in writable_arrays(item, seen)]
