@@ -244,15 +244,17 @@ class HostContract(Contract):
     def test_h20_survives_save_and_open(self, host: Any, tmp_path: Path) -> None:
         """Document, poses, keys, surfaces and ids are the same after saving and opening."""
         expected = self.furnish(host)
+        # What stands after a key was set: in hosts that show one frame, what the keys say there.
+        standing = None if "poses" in self.cannot else host.read_pose(object_id(host, "arm"))
         path = tmp_path / f"saved{host.suffixes[0]}"
         again = self.reopen(host, path)
         assert again.stored_document() == expected
         assert surfaces_of(again) == surfaces_of(host)
         if "poses" not in self.cannot:
             rig_id = object_id(again, "arm")
-            rig = again.read_rig(rig_id).rig
-            assert pose_error(again.read_pose(rig_id), bent(rig, 8)) < ACCURACY
+            assert pose_error(again.read_pose(rig_id), standing) < ACCURACY
         if "keys" not in self.cannot:
+            rig = again.read_rig(rig_id).rig
             assert again.pose_keys(rig_id) == (3.0,)
             assert pose_error(again.read_pose(rig_id, 3.0), bent(rig, 9)) < ACCURACY
 

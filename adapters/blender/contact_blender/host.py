@@ -1,0 +1,258 @@
+"""The Blender host: every capability in terms of ids, plain arrays and the core's values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact_blender import compat, evaluation, exporter, fidelity, poses, selection, storage
+from contact_blender import mesh as meshes
+from contact_blender import rig as rigs
+from contact_blender.compat import bpy
+from contact_blender.ids import ObjectIds
+from contact_blender.undo import UndoBridge
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.document.asset import Asset
+from contact_core.errors import FileRefused, InvalidInput
+from contact_core.geometry.placement import Placement, split_world_from_local
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.host import (
+    DocumentStorage,
+    PoseWriting,
+    Progress,
+    RigReading,
+    SceneObject,
+    SceneReading,
+    SceneSpace,
+    SceneWriting,
+    SelectionReading,
+    StoredDocument,
+    Undo,
+)
+from contact_core.pose.rig import Pose
+from contact_core.scene_reading import fit_to_scene, stretch_pose, stretch_rig, surface_of_polygons, unstretch_pose
+
+
+@dataclass(frozen=True, eq=False)
+class _KnownRig:
+    """kept: (n,) cage vertex of each rig point. vertices: of the cage. unmoved: whether some belong to no bone."""
+
+    kept: IntArray
+    vertices: int
+    unmoved: bool
+
+
+class BlenderHost(
+    SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStorage, Undo, SelectionReading, Progress
+):
+    """The scene of Blender's window, or of the bpy module. Ids are the names under which objects were first seen.
+
+    path: a .blend to open first; None: the scene that is open. A process is one Blender, so opening a file
+    replaces what was open. Raises FileRefused.
+    """
+
+    name = "blender"
+    suffixes = (".blend",)
+
+    def __init__(self, path: Path | str | None = None) -> None:
+        if compat.version() < compat.OLDEST:
+            raise InvalidInput(
+                f"Blender 4.2 or newer is wanted, but this is {'.'.join(map(str, compat.version()))}."
+            )
+        if path is not None:
+            _open_file(Path(path))
+        self._ids = ObjectIds()
+        self._undo = UndoBridge()
+        self._known: dict[str, _KnownRig] = {}
+        storage.restore_ids(bpy.context.scene, self._ids)
+
+    def space(self) -> SceneSpace:
+        scene = bpy.context.scene
+        rate = scene.render.fps / scene.render.fps_base
+        return SceneSpace(float(scene.unit_settings.scale_length), "Z", float(rate))
+
+    # Scene reading and writing
+
+    def objects(self) -> tuple[SceneObject, ...]:
+        return tuple(
+            SceneObject(self._ids.id_of(each), str(each.name), "rig" if rigs.armature_of(each) else "surface")
+            for each in bpy.context.scene.objects
+            if each.type == "MESH"
+        )
+
+    def read_surface(self, object_id: str) -> Asset:
+        scene_object = self._mesh_object(object_id)
+        if rigs.armature_of(scene_object) is not None:
+            return self.read_rig(object_id)
+        depsgraph = meshes.current_depsgraph()
+        with meshes.evaluated_mesh(scene_object, depsgraph) as mesh:
+            local = meshes.read_polygons(mesh)
+        asset = surface_of_polygons(
+            scene_object.name, local.points, local.sizes, local.corners, self._placement(scene_object), self.space()
+        )
+        if meshes.keeps_vertices(scene_object) or asset.source_vertices is None:
+            return asset
+        made_of = meshes.evaluated_vertices(scene_object)  # (n original,) evaluated vertex, -1: none
+        sources = None if made_of is None else np.where(made_of >= 0, asset.source_vertices[made_of], -1)
+        return replace(asset, source_vertices=sources)
+
+    def placement(self, object_id: str, frame: float | None = None) -> FloatArray:
+        scene_object = self._mesh_object(object_id)
+        frame_holder = rigs.armature_of(scene_object) or scene_object
+        return self._placement(frame_holder, frame).world_from_surface
+
+    def add(self, asset: Asset, world_from_surface: Any = None) -> str:
+        with self.step(f"Add {asset.name}"):
+            world = fit_to_scene(asset, self.space(), world_from_surface)
+            object_id = self._ids.id_of(exporter.add_asset(asset, world))
+            self._undo.wrote(lambda: exporter.remove_object(self._ids.resolve(object_id)))
+        return object_id
+
+    # Rigs and poses
+
+    def read_rig(self, object_id: str) -> Asset:
+        scene_object, armature, placement = self._rigged(object_id)
+        reading = rigs.read_rig(scene_object, armature, meshes.current_depsgraph(), str(scene_object.name))
+        self._known[object_id] = _KnownRig(reading.kept, len(reading.vertices), rigs.UNMOVED in reading.rig.joints)
+        rig = stretch_rig(reading.rig, placement, self.space())
+        beyond = fidelity.beyond_linear_skinning(scene_object, armature)
+        difference = fidelity.largest_difference(scene_object, armature, reading)
+        exact = not beyond and difference is not None and difference <= fidelity.TOLERANCE
+        return Asset(
+            name=str(scene_object.name),
+            mesh=rig.surface,
+            rig=rig,
+            source_vertices=reading.vertices,
+            source_faces=reading.polygons,
+            meters_per_unit=rig.meters_per_unit,
+            up_axis=rig.up_axis,
+            notes=(*reading.notes, *beyond),
+            details={"linear skinning is exact": exact, "largest difference from Blender": difference},
+        )
+
+    def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
+        _, armature, placement = self._rigged(object_id)
+        pose = poses.read_pose(armature, frame, self._known_rig(object_id).unmoved)
+        return stretch_pose(pose, placement.surface_from_local)
+
+    def skin_points(self, object_id: str, pose: Pose) -> FloatArray:
+        scene_object, armature, placement = self._rigged(object_id)
+        local = unstretch_pose(pose, placement.surface_from_local)
+        bases = poses.bases_of(rigs.read_skeleton(armature), local, armature.name)
+        kept = self._known_rig(object_id).kept
+        with evaluation.posed(armature, bases):
+            points = evaluation.skin_in_armature(scene_object, armature)
+        return placement.surface_points(points[kept])
+
+    def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+        _, armature, placement = self._rigged(object_id)
+        local = unstretch_pose(pose, placement.surface_from_local)
+        armature_id = self._ids.id_of(armature)
+        with self.step("Pose"):
+            put_back = poses.remember(armature)
+            self._undo.wrote(lambda: put_back(self._ids.resolve(armature_id)))
+            poses.write_pose(armature, local, frame)
+
+    def pose_keys(self, object_id: str) -> tuple[float, ...]:
+        return poses.key_frames(self._rigged(object_id)[1])
+
+    # The document
+
+    def stored_document(self) -> StoredDocument | None:
+        return storage.read(bpy.context.scene)
+
+    def store_document(self, document: StoredDocument) -> None:
+        with self.step("Contact document"):
+            put_back = storage.remember(bpy.context.scene)
+            storage.write(bpy.context.scene, document, self._ids.pairs())
+            self._undo.wrote(lambda: put_back(bpy.context.scene, self._ids))
+
+    def save(self, path: Path | None = None) -> None:
+        target = str(bpy.data.filepath) if path is None else str(Path(path).resolve())
+        if not target:
+            raise FileRefused("this scene came from no file; say where to save it.")
+        try:  # Blender writes a file beside the old one and renames it: whole or not at all
+            bpy.ops.wm.save_as_mainfile(filepath=target, check_existing=False)
+        except RuntimeError as error:
+            raise FileRefused(f"Blender could not save {target}: {str(error).strip()}") from error
+
+    # Undo
+
+    def step(self, label: str) -> AbstractContextManager[None]:
+        return self._undo.step(label)
+
+    def undo(self) -> bool:
+        return self._undo.undo()
+
+    def redo(self) -> bool:
+        return self._undo.redo()
+
+    def on_undo(self, listener: Callable[[], None]) -> Callable[[], None]:
+        return self._undo.on_undo(listener)
+
+    # Selections and progress
+
+    def selections(self, object_id: str) -> tuple[str, ...]:
+        return selection.names(self._mesh_object(object_id))
+
+    def selected_points(self, object_id: str, selection_name: str) -> SurfacePoints:
+        chosen = selection.vertices(self._mesh_object(object_id), selection_name)
+        asset = self.read_surface(object_id)
+        if asset.source_vertices is None:
+            raise InvalidInput(
+                f"{object_id} is linked from another file and its modifiers add vertices; make it local."
+            )
+        reached = np.unique(asset.source_vertices[chosen])
+        return SurfacePoints.at_vertices(asset.mesh, reached[reached >= 0])
+
+    def progress(self, fraction: float, text: str) -> bool:
+        """Blender's progress cursor. A cancel key is heard only by a modal operator, so this never says so."""
+        manager = bpy.context.window_manager
+        if fraction <= 0.0:
+            manager.progress_begin(0.0, 1.0)
+        manager.progress_update(min(max(fraction, 0.0), 1.0))
+        if fraction >= 1.0:
+            manager.progress_end()
+        return True
+
+    # Resolving: for the length of one call
+
+    def _mesh_object(self, object_id: str) -> Any:
+        scene_object = self._ids.resolve(object_id)
+        if scene_object.type != "MESH":
+            raise InvalidInput(f"{object_id} is a {scene_object.type.lower()}; contacts lie on meshes.")
+        return scene_object
+
+    def _rigged(self, object_id: str) -> tuple[Any, Any, Placement]:
+        """Mesh object, armature object, placement of the armature."""
+        scene_object = self._mesh_object(object_id)
+        armature = rigs.armature_of(scene_object)
+        if armature is None:
+            raise InvalidInput(f"{object_id} is a surface and has no rig: no armature deforms it.")
+        return scene_object, armature, self._placement(armature)
+
+    def _known_rig(self, object_id: str) -> _KnownRig:
+        """What the last reading of the rig found; read again when the mesh has another number of vertices."""
+        known = self._known.get(object_id)
+        if known is None or known.vertices != len(self._mesh_object(object_id).data.vertices):
+            self.read_rig(object_id)
+        return self._known[object_id]
+
+    def _placement(self, scene_object: Any, frame: float | None = None) -> Placement:
+        with evaluation.graph_at(frame, scene_object) as depsgraph:
+            return split_world_from_local(np.array(scene_object.evaluated_get(depsgraph).matrix_world, float))
+
+
+def _open_file(source: Path) -> None:
+    """Let this process's Blender open a file. Raises FileRefused."""
+    if not source.is_file():
+        raise FileRefused(f"there is no file {source}.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(source.resolve()), load_ui=False)
+    except RuntimeError as error:
+        raise FileRefused(f"Blender cannot open {source}: {str(error).strip()}") from error

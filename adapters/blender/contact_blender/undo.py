@@ -1,0 +1,118 @@
+"""Blender's undo, in steps: it is the authority for the scene, and the core's history follows it by revision.
+
+Measured on 4.2 to 5.2: pushing, undoing and redoing work without a window; nothing can be undone before a first
+push; operators called from Python push no step; in a mesh's Edit Mode a step holds that mesh and nothing else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import bpy
+
+from contact_core.errors import InvalidInput
+
+
+class UndoBridge:
+    """Steps of one host. Holds functions and numbers, never Blender objects."""
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._written = False
+        self._undo_of_writes: list[Callable[[], None]] = []
+        self._listeners: list[Callable[[], None]] = []
+        self._failure: Exception | None = None
+        self._based_on: int | None = None
+
+    @contextlib.contextmanager
+    def step(self, label: str) -> Iterator[None]:
+        """All that is written inside becomes one step of Blender's undo; steps inside a step join it."""
+        if self._depth == 0:
+            _refuse_edit_mode(label)
+            self._ensure_base()
+        self._depth += 1
+        already = len(self._undo_of_writes)
+        try:
+            yield
+        except BaseException:
+            for take_back in reversed(self._undo_of_writes[already:]):
+                take_back()
+            del self._undo_of_writes[already:]
+            raise
+        finally:
+            self._depth -= 1
+            if self._depth == 0:
+                wrote, self._undo_of_writes = bool(self._undo_of_writes), []
+                if wrote:
+                    bpy.ops.ed.undo_push(message=label)
+
+    def wrote(self, take_back: Callable[[], None]) -> None:
+        """Tell of a write inside a step, and how to take it back should the step fail."""
+        self._undo_of_writes.append(take_back)
+
+    def undo(self) -> bool:
+        return self._run(bpy.ops.ed.undo)
+
+    def redo(self) -> bool:
+        return self._run(bpy.ops.ed.redo)
+
+    def on_undo(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener` after every undo and redo of Blender, by the user's keys as well; the result stops it."""
+        if not self._listeners:
+            for handlers in _handlers():
+                handlers.append(self._after)
+        self._listeners.append(listener)
+
+        def stop() -> None:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+                if not self._listeners:
+                    for handlers in _handlers():
+                        if self._after in handlers:
+                            handlers.remove(self._after)
+
+        return stop
+
+    def _run(self, operator: Any) -> bool:
+        if self._depth:
+            raise InvalidInput("undo and redo wait until the step that is under way has ended.")
+        if not operator.poll():
+            return False
+        self._failure = None
+        operator()
+        if self._failure is not None:  # Blender only prints what a handler raises
+            raise self._failure
+        return True
+
+    def _ensure_base(self) -> None:
+        """Blender can go back only to a step: without a window, a file that was just opened has none."""
+        scene = bpy.context.scene
+        if self._based_on == scene.session_uid or bpy.ops.ed.undo.poll() or bpy.ops.ed.redo.poll():
+            return
+        if bpy.app.background:
+            bpy.ops.ed.undo_push(message="Original")
+        self._based_on = scene.session_uid
+
+    @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+    def _after(self, *_: Any) -> None:
+        for listener in tuple(self._listeners):
+            try:
+                listener()
+            except Exception as error:
+                self._failure = self._failure or error
+                raise
+
+
+def _handlers() -> tuple[Any, Any]:
+    return bpy.app.handlers.undo_post, bpy.app.handlers.redo_post
+
+
+def _refuse_edit_mode(label: str) -> None:
+    mode = str(bpy.context.mode)
+    if mode.startswith("EDIT"):
+        raise InvalidInput(
+            f"{label!r} waits until you leave Edit Mode ({mode.lower()}): Blender's undo there remembers only the"
+            " data being edited, so the step could not be undone."
+        )

@@ -1,0 +1,34 @@
+"""Blender keeps the host contract, without a window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from contact_core.host import SceneSpace
+from contact_core.testing.host_contract import Build, HostContract
+
+
+class TestBlenderHost(HostContract):
+    subject = "blender"
+    spaces = (SceneSpace(1.0, "Z"), SceneSpace(0.01, "Z"))  # Blender's up axis is Z
+    cannot = {  # noqa: RUF012
+        "display": "the overlay needs a window; patches are shown by the add-on's draw handler",
+        "picking": "there is no region without a window; the add-on's tools cast their own rays",
+    }
+
+    @pytest.fixture
+    def build(self, scenes: Any) -> Build:
+        return scenes.build
+
+    def foreign_edit(self, host: Any) -> None:
+        import bpy
+
+        bpy.data.objects["plain"].location.x += 1.0
+        bpy.ops.ed.undo_push(message="Move")
+
+    def scene_state(self, host: Any) -> Any:
+        import blender_scenes
+
+        return [super().scene_state(host), blender_scenes.whole_state()]
