@@ -117,6 +117,11 @@ def manipulator_length(rig: Rig, joints: IntArray | None = None) -> float:
     return diameter(points)
 
 
+def uniform_scale(transform: FloatArray) -> float:
+    """By how much lengths grow under a transform (4, 4), the mean over directions."""
+    return float(abs(np.linalg.det(transform[:3, :3])) ** (1.0 / 3.0))
+
+
 def diameter(points: FloatArray) -> float:
     """The largest distance between two of the points (n, 3)."""
     if len(points) < 2:

@@ -12,7 +12,7 @@ import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.body import Body, PairedPoints, manipulator_length
+from contact_core.pose.body import Body, PairedPoints, manipulator_length, uniform_scale
 from contact_core.pose.chart import Chart, Motion
 from contact_core.pose.rig import Pose
 from contact_core.pose.skinning import Track, normal_track, point_track
@@ -231,13 +231,13 @@ class PoseProblem:
         if self.length is not None:
             return float(self.length)
         lengths = [
-            manipulator_length(body.rig, self._driven(index)) * _scale(body.world_from_rig)
+            manipulator_length(body.rig, self._driven(index)) * uniform_scale(body.world_from_rig)
             for index, body in enumerate(self.bodies)
             if len(self.free_of_body[index]) and len(body.rig.joints) > 1
         ]
         if not lengths:  # only rigid things move
             lengths = [
-                manipulator_length(body.rig) * _scale(body.world_from_rig)
+                manipulator_length(body.rig) * uniform_scale(body.world_from_rig)
                 for index, body in enumerate(self.bodies)
                 if len(self.free_of_body[index])
             ]
@@ -348,7 +348,3 @@ def _named(chart: Chart, names: Iterable[str]) -> BoolArray:
         else:
             result |= chart.joint_of_dof == chart.rig.joint_index(name)
     return result
-
-
-def _scale(transform: FloatArray) -> float:
-    return float(abs(np.linalg.det(transform[:3, :3])) ** (1.0 / 3.0))

@@ -52,9 +52,10 @@ class Track:
             )
         bones = np.union1d(self.bones, other.bones)
         blocks = np.zeros((len(self), len(bones), self.width))
-        blocks[:, np.searchsorted(bones, self.bones)] += self.matrix.reshape(len(self), -1, self.width)
-        blocks[:, np.searchsorted(bones, other.bones)] += factor * other.matrix.reshape(len(self), -1, self.width)
-        return Track(bones, blocks.reshape(len(self), -1), self.width)
+        blocks[:, np.searchsorted(bones, self.bones)] += self.matrix.reshape(len(self), len(self.bones), self.width)
+        theirs = other.matrix.reshape(len(self), len(other.bones), self.width)
+        blocks[:, np.searchsorted(bones, other.bones)] += factor * theirs
+        return Track(bones, blocks.reshape(len(self), len(bones) * self.width), self.width)
 
     def rows(self, index: IntArray) -> Track:
         """The track of some of the rows, in the order of `index`."""
@@ -77,9 +78,9 @@ class Track:
         row = 0
         for track in tracks:
             columns = np.searchsorted(bones, track.bones)
-            blocks[row : row + len(track), columns] = track.matrix.reshape(len(track), -1, width)
+            blocks[row : row + len(track), columns] = track.matrix.reshape(len(track), len(track.bones), width)
             row += len(track)
-        return cls(bones, blocks.reshape(row, -1), width)
+        return cls(bones, blocks.reshape(row, len(bones) * width), width)
 
 
 def point_track(rig: Rig, points: SurfacePoints, first_bone: int = 0) -> Track:
@@ -116,7 +117,7 @@ def joint_track(joints: IntArray, local_points: FloatArray, first_bone: int = 0)
     columns = np.searchsorted(bones, joints)
     blocks[np.arange(len(joints)), columns, :3] = local_points
     blocks[np.arange(len(joints)), columns, 3] = 1.0
-    return Track(bones + first_bone, blocks.reshape(len(joints), -1), 4)
+    return Track(bones + first_bone, blocks.reshape(len(joints), 4 * len(bones)), 4)
 
 
 def joint_from_bind(rig: Rig) -> FloatArray:
@@ -172,4 +173,4 @@ def _gather(
     carried = np.einsum("eab,eb->ea", inverse_bind[joints], values) * weights[:, None]  # (e, width)
     blocks = np.zeros((count, len(bones), width))
     np.add.at(blocks, (rows, np.searchsorted(bones, joints)), carried)
-    return Track(bones + first_bone, blocks.reshape(count, -1), width)
+    return Track(bones + first_bone, blocks.reshape(count, len(bones) * width), width)

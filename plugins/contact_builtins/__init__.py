@@ -16,7 +16,11 @@ def contact_brushes() -> list[object]:
 
 @hookimpl
 def contact_axis_generators() -> list[object]:
-    return []
+    return [
+        "contact_builtins.axes.along_bone:AlongBone",
+        "contact_builtins.axes.principal:Principal",
+        "contact_builtins.axes.farthest_pair:FarthestPair",
+    ]
 
 
 @hookimpl
@@ -45,6 +49,9 @@ def contact_pose_terms() -> list[object]:
         "contact_core.pose.terms:NormalTerm",
         "contact_core.pose.terms:PriorTerm",
         "contact_builtins.terms.penetration:PenetrationTerm",
+        "contact_builtins.terms.self_collision:SelfCollisionTerm",
+        "contact_builtins.terms.aims:PinTerm",
+        "contact_builtins.terms.aims:LookTerm",
     ]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.pose.body import uniform_scale
 from contact_core.pose.skinning import Track, vertex_track
 from contact_core.pose.state import PoseState
 from contact_core.pose.terms import BoundTerm
@@ -158,11 +159,10 @@ def _solid(problem: PoseProblem, name: str, term: PenetrationTerm) -> _Solid:
     if not meshes:
         raise InvalidInput(f"solids of {name!r} are empty; give at least one closed mesh or leave the body out.")
     bone = int(problem.bone_offsets[index])
-    linear = problem.start_state.world[bone][:3, :3]
     return _Solid(
         bone=bone,
         surface_from_joint=np.asarray(body.rig.bind_world[0]),
-        scale=float(abs(np.linalg.det(linear)) ** (1.0 / 3.0)),
+        scale=uniform_scale(problem.start_state.world[bone]),
         movable=len(problem.free_of_body[index]) > 0,
         fields=tuple(DistanceField.of(mesh, resolution=term.resolution) for mesh in meshes),
         low=np.min([mesh.points.min(axis=0) for mesh in meshes], axis=0),

@@ -1,0 +1,104 @@
+"""Self-collision: capsules of one skinned body that overlap cost the square of their depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.errors import InvalidInput
+from contact_core.pose.body import uniform_scale
+from contact_core.pose.capsules import closest_on_segments, fit_capsules
+from contact_core.pose.skinning import Track, joint_track
+from contact_core.pose.state import PoseState
+from contact_core.pose.terms import BoundTerm, LeastSquares
+
+if TYPE_CHECKING:
+    from contact_core.pose.problem import PoseProblem
+
+
+@dataclass(frozen=True)
+class SelfCollisionTerm:
+    """Mean over a body's capsules of (depth / l)^2, summed over pairs that are apart at rest."""
+
+    weight: float = 5.0
+    name: str = "self-collision"
+
+    def bind(self, problem: PoseProblem) -> BoundTerm:
+        return _SelfCollision(self, problem)
+
+
+@dataclass(frozen=True, eq=False)
+class _Capsuled:
+    """One body: the track of all capsule ends (2c rows), radii (c,), pairs (p, 2)."""
+
+    ends: Track
+    radii: FloatArray
+    pairs: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Overlap:
+    """Overlapping pairs: the track of the vectors between closest points, those vectors, depths."""
+
+    between: Track
+    direction: FloatArray
+    depth: FloatArray
+
+
+class _SelfCollision(LeastSquares):
+    def __init__(self, term: SelfCollisionTerm, problem: PoseProblem) -> None:
+        self.bodies = []
+        for index, body in enumerate(problem.bodies):
+            if len(body.rig.joints) > 1 and len(problem.free_of_body[index]):
+                capsules = fit_capsules(body.rig)
+                joints = np.repeat(capsules.joints, 2)
+                track = joint_track(joints, capsules.ends.reshape(-1, 3), int(problem.bone_offsets[index]))
+                self.bodies.append(
+                    _Capsuled(track, uniform_scale(body.world_from_rig) * capsules.radii, capsules.pairs)
+                )
+        if not self.bodies:
+            raise InvalidInput("the self-collision term needs a skinned body that moves, but the problem has none.")
+        count = sum(len(body.radii) for body in self.bodies)
+        self.factor = np.sqrt(2.0 * term.weight / max(count, 1)) / problem.unit
+
+    def residuals(self, state: PoseState) -> FloatArray:
+        return self.factor * np.concatenate([overlap.depth for overlap in self._overlaps(state)])
+
+    def jacobian(self, state: PoseState) -> FloatArray:
+        rows = [
+            -np.einsum("pi,pid->pd", overlap.direction, state.jacobian(overlap.between))
+            for overlap in self._overlaps(state)
+        ]
+        return self.factor * np.concatenate(rows)
+
+    def _overlaps(self, state: PoseState) -> list[_Overlap]:
+        """Per body; found once per state. Where on the segments two capsules come closest does not vary to first
+        order in their distance, so the closest points count as fixed to their joints."""
+        kept: list[_Overlap] | None = state.memory.get(self)
+        if kept is None:
+            kept = state.memory[self] = [_overlap(state, body) for body in self.bodies]
+        return kept
+
+
+def _overlap(state: PoseState, body: _Capsuled) -> _Overlap:
+    ends = state.vectors(body.ends).reshape(-1, 2, 3)
+    first, second = body.pairs.T
+    share = closest_on_segments(ends[first], ends[second])  # (p, 2)
+    between = _at(ends, first, share[:, 0]) - _at(ends, second, share[:, 1])
+    distance = np.linalg.norm(between, axis=1)
+    depth = body.radii[first] + body.radii[second] - distance
+    deep = (depth > 0.0) & (distance > 0.0)  # axes that cross have no direction to part in
+    first, second, share = first[deep], second[deep], share[deep]
+    track = _rows_at(body.ends, first, share[:, 0]).combined(_rows_at(body.ends, second, share[:, 1]), -1.0)
+    return _Overlap(track, between[deep] / distance[deep, None], depth[deep])
+
+
+def _at(ends: FloatArray, index: IntArray, share: FloatArray) -> FloatArray:
+    return (1.0 - share)[:, None] * ends[index, 0] + share[:, None] * ends[index, 1]
+
+
+def _rows_at(ends: Track, index: IntArray, share: FloatArray) -> Track:
+    return ends.rows(2 * index).scaled(1.0 - share).combined(ends.rows(2 * index + 1).scaled(share))
