@@ -173,11 +173,11 @@ def _primitive(geometry: Any) -> TriangleMesh | None:
 
 
 def _starting_angles(joints: list[Any]) -> tuple[dict[str, float], list[str]]:
-    """Zero where the limits allow it, else the nearest allowed angle; mimics follow their leader."""
+    """Zero where the limits allow it, else just inside them; mimics follow their leader."""
     start: dict[str, float] = {}
     for joint in joints:
         low, high = _limits(joint)
-        start[joint.name] = float(np.clip(0.0, low, high)) if joint.type in ("revolute", "continuous") else 0.0
+        start[joint.name] = _inside(low, high) if joint.type in ("revolute", "continuous") else 0.0
     moved = [joint.name for joint in joints if start[joint.name] != 0.0]
     for joint in joints:
         if getattr(joint, "mimic", None) is not None:
@@ -187,6 +187,13 @@ def _starting_angles(joints: list[Any]) -> tuple[dict[str, float], list[str]]:
             start[joint.name] = rule["multiplier"] * start[rule["joint"]] + rule["offset"]
     notes = [f"Zero lies outside the limits of {', '.join(moved)}; the rest pose starts inside."] if moved else []
     return start, notes
+
+
+def _inside(low: float, high: float) -> float:
+    """Zero, or when that is not allowed the angle a tenth of the range inside the nearer limit."""
+    if low <= 0.0 <= high:
+        return 0.0
+    return low + 0.1 * (high - low) if low > 0.0 else high - 0.1 * (high - low)
 
 
 def _freedom(joint: Any, start: float) -> JointFreedom:

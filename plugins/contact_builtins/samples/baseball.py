@@ -17,7 +17,13 @@ STITCHES = 108  # double stitches, as the rule book's ball has
 def build() -> Asset:
     """7.4 cm across, centred at the origin."""
     reach = np.full(3, RADIUS + 3 * MM)
-    mesh = surface_of(leather(), -reach, reach, 2.8 * MM)
+    mesh = surface_of(
+        leather(),
+        -reach,
+        reach,
+        2.0 * MM,
+        lambda p: np.where(np.abs(np.linalg.norm(p, axis=1) - RADIUS) > 0.05 * MM, 1.4 * MM, 2.4 * MM),
+    )
     return Asset(name="baseball", mesh=mesh, meters_per_unit=1.0, up_axis="Y")
 
 

@@ -34,7 +34,7 @@ def bone_heat_weights(
 
 
 def cotangent_laplacian(mesh: TriangleMesh) -> tuple[Any, FloatArray]:
-    """The cotangent Laplacian (n, n), sparse, positive semi-definite (cotangents clipped at 0); vertex areas (n,)."""
+    """The cotangent Laplacian (n, n), sparse, semi-definite (cotangents clipped at 0), and vertex areas (n,)."""
     from scipy.sparse import coo_array, diags_array
 
     n = len(mesh.points)

@@ -24,6 +24,7 @@ def build() -> Asset:
         without(body, cavity, 4.0 * MM),
         np.array([-50, -8, -50]) * MM,
         np.array([90, 106, 50]) * MM,
-        4.5 * MM,
+        3.0 * MM,
+        4.0 * MM,
     )
     return Asset(name="mug", mesh=mesh, meters_per_unit=1.0, up_axis="Y")
