@@ -245,7 +245,7 @@ class HostContract(Contract):
         """Document, poses, keys, surfaces and ids are the same after saving and opening."""
         expected = self.furnish(host)
         # What stands after a key was set: in hosts that show one frame, what the keys say there.
-        standing = None if "poses" in self.cannot else host.read_pose(object_id(host, "arm"))
+        standing: Any = None if "poses" in self.cannot else host.read_pose(object_id(host, "arm"))
         path = tmp_path / f"saved{host.suffixes[0]}"
         again = self.reopen(host, path)
         assert again.stored_document() == expected

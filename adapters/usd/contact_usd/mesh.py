@@ -1,0 +1,136 @@
+"""UsdGeomMesh to surfaces. USD has no triangulator and lets faces through that are none; both are seen to here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.document.asset import Asset
+from contact_core.errors import InvalidInput
+from contact_core.geometry.placement import Placement, split_world_from_local
+from contact_core.host import SceneSpace
+from contact_core.scene_reading import surface_of_polygons
+
+AS_IT_STANDS = Usd.TimeCode.EarliestTime()  # a default value, or the first sample where there are only samples
+
+
+@dataclass(frozen=True, eq=False)
+class MeshArrays:
+    """A mesh as the stage holds it, in its own space, faces in holes left out.
+
+    points (n, 3); face_sizes (f,); face_indices; faces (f,): number of each face in the stage's own count.
+    """
+
+    points: FloatArray
+    face_sizes: IntArray
+    face_indices: IntArray
+    faces: IntArray
+    left_handed: bool
+    notes: tuple[str, ...]
+
+
+def time_code(frame: float | None) -> Usd.TimeCode:
+    """Frames are time codes; None is the stage as it stands."""
+    return AS_IT_STANDS if frame is None else Usd.TimeCode(frame)
+
+
+def matrix_of(matrix: Gf.Matrix4d) -> FloatArray:
+    """(4, 4) for column vectors; Gf multiplies rows."""
+    return np.array(matrix, dtype=np.float64).T
+
+
+def gf_matrix(matrix: FloatArray) -> Gf.Matrix4d:
+    """The way back."""
+    return Gf.Matrix4d(np.asarray(matrix, dtype=np.float64).T.tolist())
+
+
+def world_of(prim: Usd.Prim, frame: float | None = None) -> FloatArray:
+    """(4, 4) world_from_local with all parents, honouring resetXformStack."""
+    return matrix_of(UsdGeom.XformCache(time_code(frame)).GetLocalToWorldTransform(prim))
+
+
+def placement_of(prim: Usd.Prim, frame: float | None = None) -> Placement:
+    """Where a prim stands: the stretch as it stands, the motion at the frame. Raises InvalidInput with its path."""
+    try:
+        still = split_world_from_local(world_of(prim))
+        if frame is None:
+            return still
+        moved = split_world_from_local(world_of(prim, frame))
+    except InvalidInput as error:
+        raise InvalidInput(f"{prim.GetPath()}: {error}") from error
+    return replace(still, world_from_surface=moved.world_from_surface)
+
+
+def read_arrays(prim: Usd.Prim) -> MeshArrays:
+    """The arrays of a UsdGeomMesh. Raises InvalidInput naming the prim when they do not fit together."""
+    mesh = UsdGeom.Mesh(prim)
+    points = np.asarray(mesh.GetPointsAttr().Get(AS_IT_STANDS) or np.zeros((0, 3)), np.float64).reshape(-1, 3)
+    sizes = np.asarray(mesh.GetFaceVertexCountsAttr().Get(AS_IT_STANDS) or [], np.int64)
+    indices = np.asarray(mesh.GetFaceVertexIndicesAttr().Get(AS_IT_STANDS) or [], np.int64)
+    if len(points) == 0 or len(sizes) == 0:
+        raise InvalidInput(f"{prim.GetPath()} is a mesh without points or faces.")
+    if sizes.sum() != len(indices):
+        raise InvalidInput(
+            f"{prim.GetPath()}: faceVertexCounts add up to {sizes.sum()}, but there are {len(indices)} indices."
+        )
+    notes = []
+    if mesh.GetPointsAttr().ValueMightBeTimeVarying():
+        notes.append("the points are animated; the surface is that of the first sample.")
+    scheme = mesh.GetSubdivisionSchemeAttr().Get()
+    if scheme != UsdGeom.Tokens.none:
+        notes.append(f"the mesh is a {scheme} cage; patches lie on the cage, not on the smooth surface drawn.")
+    holes = np.asarray(mesh.GetHoleIndicesAttr().Get(AS_IT_STANDS) or [], np.int64)
+    kept = np.ones(len(sizes), bool)
+    kept[holes[(holes >= 0) & (holes < len(sizes))]] = False
+    if not kept.all():
+        notes.append(f"{np.count_nonzero(~kept)} faces are holes and were left out.")
+        indices, sizes = indices[np.repeat(kept, sizes)], sizes[kept]
+    left_handed = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+    return MeshArrays(points, sizes, indices, np.flatnonzero(kept), left_handed, tuple(notes))
+
+
+def read_surface(prim: Usd.Prim, space: SceneSpace) -> Asset:
+    """The surface of a mesh prim. Raises InvalidInput."""
+    arrays = read_arrays(prim)
+    try:
+        asset = surface_of_polygons(
+            prim.GetName(),
+            arrays.points,
+            arrays.face_sizes,
+            arrays.face_indices,
+            placement_of(prim),
+            space,
+            clockwise=arrays.left_handed,
+            notes=arrays.notes,
+        )
+    except InvalidInput as error:
+        raise InvalidInput(f"{prim.GetPath()}: {error}") from error
+    assert asset.source_faces is not None  # surface_of_polygons fills it
+    return replace(asset, source_faces=arrays.faces[asset.source_faces], details={"prim": str(prim.GetPath())})
+
+
+def selected_points_of(prim: Usd.Prim, subset: str) -> IntArray:
+    """Indices of a mesh's own points that a GeomSubset of faces or points names. Raises InvalidInput."""
+    there = {item.GetPrim().GetName(): item for item in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Mesh(prim))}
+    if subset not in there:
+        raise InvalidInput(f"{prim.GetPath()} has no GeomSubset {subset!r}; it has {sorted(there)}.")
+    chosen = np.asarray(there[subset].GetIndicesAttr().Get(AS_IT_STANDS) or [], np.int64)
+    kind = there[subset].GetElementTypeAttr().Get()
+    if kind == UsdGeom.Tokens.point:
+        return np.unique(chosen)
+    if kind != UsdGeom.Tokens.face:
+        raise InvalidInput(
+            f"{prim.GetPath()}: the GeomSubset {subset!r} selects {kind}s; faces or points were wanted."
+        )
+    sizes = np.asarray(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get(AS_IT_STANDS), np.int64)
+    indices = np.asarray(UsdGeom.Mesh(prim).GetFaceVertexIndicesAttr().Get(AS_IT_STANDS), np.int64)
+    return np.unique(indices[np.repeat(np.isin(np.arange(len(sizes)), chosen), sizes)])
+
+
+def subset_names(prim: Usd.Prim) -> tuple[str, ...]:
+    """Names of a mesh's GeomSubsets."""
+    subsets = UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Mesh(prim))
+    return tuple(item.GetPrim().GetName() for item in subsets)

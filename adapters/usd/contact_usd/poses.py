@@ -1,0 +1,102 @@
+"""Poses as SkelAnimation in our layer: a default value for the pose without a key, time samples for keys.
+
+An animation that the scene brings is copied when its skeleton is first posed here, so that our keys join its keys;
+the scene's own layers stay as they are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pxr import Sdf, Usd, UsdSkel, Vt
+
+from contact_core.arrays import FloatArray
+from contact_core.errors import InvalidInput
+from contact_usd.mesh import gf_matrix, matrix_of
+
+TRACKS = ("translations", "rotations", "scales")
+ROUNDING = 1e-3  # scales are stored in half precision
+
+
+def local_pose(
+    cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton, rest: FloatArray, frame: float | None
+) -> FloatArray:
+    """(j, 4, 4) parent_from_joint at a frame, in skeleton space; None: unkeyed value, first key, or rest."""
+    query = cache.GetSkelQuery(skeleton)
+    animation = query.GetAnimQuery()
+    if not animation:
+        return rest
+    time = Usd.TimeCode(frame) if frame is not None else _standing_time(animation.GetPrim())
+    matrices = query.ComputeJointLocalTransforms(time)
+    if matrices is None or len(matrices) != len(rest):
+        return rest
+    return np.stack([matrix_of(m) for m in matrices])
+
+
+def key_frames(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> tuple[float, ...]:
+    """Time codes with a sample of any joint, ascending."""
+    animation = cache.GetSkelQuery(skeleton).GetAnimQuery()
+    return tuple(animation.GetJointTransformTimeSamples()) if animation else ()
+
+
+def write(
+    stage: Usd.Stage, cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton, local: FloatArray, frame: float | None
+) -> None:
+    """Write a whole pose (j, 4, 4). The stage's edit target must be our layer. Raises InvalidInput."""
+    _check_scales(local, str(skeleton.GetPath()))
+    query = cache.GetSkelQuery(skeleton)
+    path = animation_path(skeleton)
+    animation = UsdSkel.Animation.Get(stage, path)
+    if not animation:
+        animation = UsdSkel.Animation.Define(stage, path)
+        animation.CreateJointsAttr(query.GetJointOrder())
+        _copy_source(query, animation)
+        binding = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
+        binding.CreateAnimationSourceRel().SetTargets([path])
+    time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
+    animation.SetTransforms(Vt.Matrix4dArray([gf_matrix(m) for m in local]), time)
+
+
+def animation_path(skeleton: UsdSkel.Skeleton) -> Sdf.Path:
+    """Where our animation of a skeleton is: beside it. Raises InvalidInput inside an instance."""
+    prim = skeleton.GetPrim()
+    if prim.IsInstanceProxy():
+        raise InvalidInput(
+            f"{prim.GetPath()} lies in an instance, which is read-only. Make it uninstanced"
+            " (instanceable = false) on the instance prim to pose it."
+        )
+    return prim.GetPath().GetParentPath().AppendChild(f"{prim.GetName()}_ContactPose")
+
+
+def _copy_source(query: UsdSkel.SkeletonQuery, animation: UsdSkel.Animation) -> None:
+    """All samples of the animation that drove the skeleton so far, for all of its joints."""
+    source = query.GetAnimQuery()
+    if not source:
+        return
+    for frame in source.GetJointTransformTimeSamples():
+        matrices = query.ComputeJointLocalTransforms(Usd.TimeCode(frame))
+        animation.SetTransforms(matrices, Usd.TimeCode(frame))
+    standing = _standing_time(source.GetPrim())
+    if standing.IsDefault():
+        animation.SetTransforms(query.ComputeJointLocalTransforms(standing), standing)
+
+
+def _standing_time(prim: Usd.Prim) -> Usd.TimeCode:
+    """The time of the pose as it stands: the default values where any are authored, else the first sample."""
+    animation = UsdSkel.Animation(prim)
+    tracks = (animation.GetTranslationsAttr(), animation.GetRotationsAttr(), animation.GetScalesAttr())
+    if any(track.Get(Usd.TimeCode.Default()) is not None for track in tracks):
+        return Usd.TimeCode.Default()
+    return Usd.TimeCode.EarliestTime()
+
+
+def _check_scales(local: FloatArray, path: str) -> None:
+    """SkelAnimation holds scales in half precision and no shear: refuse what would not come back."""
+    scales = np.linalg.norm(local[:, :3, :3], axis=1)  # (j, 3) of the columns
+    off = np.abs(scales - scales.astype(np.float16)).max(initial=0.0)
+    shear = np.einsum("jia,jib->jab", local[:, :3, :3], local[:, :3, :3])
+    shear = np.abs(shear - np.eye(3) * np.diagonal(shear, axis1=1, axis2=2)[:, None, :]).max(initial=0.0)
+    if off > ROUNDING or shear > ROUNDING:
+        raise InvalidInput(
+            f"a pose of {path} has sheared joints (by {shear:.2g}) or scales that half precision rounds by"
+            f" {off:.2g}; a SkelAnimation cannot hold it."
+        )

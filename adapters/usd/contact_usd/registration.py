@@ -1,0 +1,41 @@
+"""Making the codeless schema known to USD, and noticing when that came too late.
+
+USD reads its schema plugins once, when anything first asks for a schema (opening a stage does). A plugin that
+registers afterwards is accepted and silently has no effect in that process.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from pxr import Plug, Sdf, Usd
+
+from contact_usd.schema_dir import ENVIRONMENT_VARIABLE, schema_dir
+
+SCHEMAS = ("ContactDocumentAPI", "ContactPatchAPI", "ContactPairAPI")
+
+
+@lru_cache(maxsize=1)
+def register() -> str | None:
+    """Register the schema; None when USD knows it now, else a sentence with the reason and the cure."""
+    Plug.Registry().RegisterPlugins(str(schema_dir()))
+    registry = Usd.SchemaRegistry()
+    if all(registry.FindAppliedAPIPrimDefinition(name) for name in SCHEMAS):
+        return None
+    return (
+        "USD was in use before contact_usd was imported, so its schemas stay unknown in this process. All data is"
+        " written and read in full all the same; only fallbacks and checks by schema are missing. To have them,"
+        f" import contact_usd.host before the first stage is opened, or start the host with {ENVIRONMENT_VARIABLE}"
+        f" containing {schema_dir()}."
+    )
+
+
+def apply_schema(prim: Usd.Prim, schema: str) -> None:
+    """Apply an API schema of ours, known to this process or not."""
+    prim.AddAppliedSchema(schema)
+
+
+def has_schema(prim: Usd.Prim, schema: str) -> bool:
+    """Whether the prim says it has the schema; HasAPI would not see a schema that USD does not know."""
+    applied = prim.GetMetadata("apiSchemas")
+    return isinstance(applied, Sdf.TokenListOp) and schema in applied.GetAppliedItems()

@@ -1,0 +1,289 @@
+"""UsdSkel rigs to the analytic rig: all meshes that one skeleton drives become one skin.
+
+UsdSkel skins in skeleton space: sum of weight * joint * inverse bind * geomBindTransform * point; the meshes' own
+transforms play no part. So rig space is skeleton space with the stretch of the skeleton's world matrix applied.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdSkel
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.document.asset import Asset
+from contact_core.errors import InvalidInput
+from contact_core.geometry.triangulate import triangulate
+from contact_core.geometry.weld import weld
+from contact_core.host import SceneSpace
+from contact_core.pose.rig import JointFreedom, Rig
+from contact_core.scene_reading import stretch_rig
+from contact_usd.mesh import AS_IT_STANDS, matrix_of, placement_of, read_arrays
+
+FREEDOMS = "contact:jointFreedoms"  # JSON: what USD has no word for (limits, hinges), written by our exporter
+INSTANCES = Usd.TraverseInstanceProxies()
+
+
+@dataclass(frozen=True, eq=False)
+class SkinPart:
+    """One skinned mesh, in skeleton space. first: (p,) the mesh's own point behind each skin point.
+    of_source: (n,) skin point of each of the mesh's own points. joints, weights: (p, K) as authored."""
+
+    path: str
+    points: FloatArray
+    faces: IntArray
+    source_faces: IntArray
+    first: IntArray
+    of_source: IntArray
+    joints: IntArray
+    weights: FloatArray
+    notes: tuple[str, ...]
+
+
+def bindings(stage: Usd.Stage) -> dict[str, tuple[UsdSkel.Cache, UsdSkel.Binding]]:
+    """Every skeleton that drives a mesh, by path. Read anew each time: the cache does not notice a new binding."""
+    found: dict[str, tuple[UsdSkel.Cache, UsdSkel.Binding]] = {}
+    for prim in stage.Traverse(INSTANCES):
+        if not prim.IsA(UsdSkel.Root):
+            continue
+        cache = UsdSkel.Cache()
+        root = UsdSkel.Root(prim)
+        cache.Populate(root, INSTANCES)
+        for binding in cache.ComputeSkelBindings(root, INSTANCES):
+            path = str(binding.GetSkeleton().GetPrim().GetPath())
+            if path not in found and any(True for _ in skinned_meshes(binding)):
+                found[path] = (cache, binding)
+    return found
+
+
+def skinned_meshes(binding: UsdSkel.Binding) -> Iterator[UsdSkel.SkinningQuery]:
+    """The meshes that a skeleton moves by joint influences."""
+    for query in binding.GetSkinningTargets():
+        if query.GetPrim().IsA(UsdGeom.Mesh) and query.HasJointInfluences():
+            yield query
+
+
+def joint_names(skeleton: UsdSkel.Skeleton) -> tuple[str, ...]:
+    """Unique names: `jointNames` where authored, else the last part of each path, else whole paths."""
+    paths = [str(token) for token in skeleton.GetJointsAttr().Get() or ()]
+    given = [str(token) for token in skeleton.GetJointNamesAttr().Get() or ()]
+    for names in (given, [path.rsplit("/", 1)[-1] for path in paths]):
+        if len(names) == len(paths) == len(set(names)):
+            return tuple(names)
+    return tuple(paths)
+
+
+def read_rig(cache: UsdSkel.Cache, binding: UsdSkel.Binding, space: SceneSpace) -> tuple[Asset, list[SkinPart]]:
+    """The rig as an asset in surface space, and its parts. Raises InvalidInput naming what cannot be reproduced."""
+    skeleton = binding.GetSkeleton()
+    prim = skeleton.GetPrim()
+    query = cache.GetSkelQuery(skeleton)
+    if not query or not query.GetJointOrder():
+        raise InvalidInput(f"{prim.GetPath()} is a skeleton without joints, or its topology is not valid.")
+    parts = [_read_part(item, query) for item in skinned_meshes(binding)]
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    joints, weights, weight_notes = _influences(parts)
+    parents = np.asarray(query.GetTopology().GetParentIndices(), np.int64)
+    bind = np.stack([matrix_of(m) for m in query.GetJointWorldBindTransforms()])
+    rest, rest_notes = _rest_local(skeleton, parents, bind)
+    placement = placement_of(prim)
+    try:
+        local = Rig(
+            name=prim.GetName(),
+            joints=joint_names(skeleton),
+            parents=parents,
+            rest_local=rest,
+            bind_world=bind,
+            bind_points=np.concatenate([part.points for part in parts]),
+            faces=np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
+            skin_joints=joints,
+            skin_weights=weights,
+            freedoms=_freedoms(prim, len(parents)),
+            meters_per_unit=space.meters_per_unit,
+            up_axis=space.up_axis,
+        )
+        rig = stretch_rig(local, placement, space)
+    except InvalidInput as error:
+        raise InvalidInput(f"{prim.GetPath()}: {error}") from error
+    face_starts = np.cumsum([0, *(int(part.source_faces.max(initial=-1)) + 1 for part in parts)])
+    asset = Asset(
+        name=prim.GetName(),
+        mesh=rig.surface,
+        rig=rig,
+        source_vertices=np.concatenate([p.of_source + start for p, start in zip(parts, starts, strict=False)]),
+        source_faces=np.concatenate([p.source_faces + start for p, start in zip(parts, face_starts, strict=False)]),
+        meters_per_unit=space.meters_per_unit,
+        up_axis=space.up_axis,
+        notes=(*rest_notes, *weight_notes, *(note for part in parts for note in part.notes)),
+        details={"prim": str(prim.GetPath()), "parts": _part_table(parts)},
+    )
+    return asset, parts
+
+
+def rest_local(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> FloatArray:
+    """(j, 4, 4) parent_from_joint of the rest pose, in skeleton space."""
+    query = cache.GetSkelQuery(skeleton)
+    bind = np.stack([matrix_of(m) for m in query.GetJointWorldBindTransforms()])
+    return _rest_local(skeleton, np.asarray(query.GetTopology().GetParentIndices(), np.int64), bind)[0]
+
+
+def skin_of_stage(
+    cache: UsdSkel.Cache, binding: UsdSkel.Binding, parts: list[SkinPart], time: Usd.TimeCode
+) -> FloatArray:
+    """(n, 3) skin points by UsdSkel's own evaluation at a time, in skeleton space."""
+    transforms = cache.GetSkelQuery(binding.GetSkeleton()).ComputeSkinningTransforms(time)
+    moved = []
+    for query, part in zip(skinned_meshes(binding), parts, strict=True):
+        points = UsdGeom.Mesh(query.GetPrim()).GetPointsAttr().Get(AS_IT_STANDS)
+        if not query.ComputeSkinnedPoints(transforms, points, AS_IT_STANDS):
+            raise InvalidInput(f"{part.path}: UsdSkel could not skin the points.")
+        moved.append(np.asarray(points, np.float64)[part.first])
+    return np.concatenate(moved)
+
+
+def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) -> SkinPart:
+    prim = query.GetPrim()
+    path = str(prim.GetPath())
+    method = query.GetSkinningMethod()
+    if method != UsdSkel.Tokens.classicLinear:
+        raise InvalidInput(
+            f"{path} is skinned by {method}, which a linear rig does not reproduce (differences reach 4% of the"
+            " size). Set primvars:skel:skinningMethod to classicLinear to pose it here."
+        )
+    arrays = read_arrays(prim)
+    notes = list(arrays.notes)
+    if query.HasBlendShapes():
+        notes.append("blend shapes are not part of the rig; the skin is without them.")
+    joints, weights = _varying_influences(query, skeleton, len(arrays.points), path)
+    kept, of_source = weld(arrays.points, tolerance=0.0)
+    first, of_source = _split_unlike(of_source, len(kept), joints, weights)
+    faces, cut_faces, cut_notes = triangulate(
+        arrays.face_sizes, of_source[arrays.face_indices], arrays.points[first]
+    )
+    bind = matrix_of(query.GetGeomBindTransform(AS_IT_STANDS))
+    if arrays.left_handed != bool(np.linalg.det(bind[:3, :3]) < 0):
+        faces = faces[:, [0, 2, 1]]
+    return SkinPart(
+        path,
+        arrays.points[first] @ bind[:3, :3].T + bind[:3, 3],
+        faces,
+        arrays.faces[cut_faces],
+        first,
+        of_source,
+        joints[first],
+        weights[first],
+        tuple(f"{prim.GetName()}: {note}" for note in (*notes, *cut_notes)),
+    )
+
+
+def _varying_influences(
+    query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery, count: int, path: str
+) -> tuple[IntArray, FloatArray]:
+    """(n, K) joints in the skeleton's order and weights, for constant influences and own joint orders too."""
+    computed = query.ComputeVaryingJointInfluences(count, AS_IT_STANDS)
+    if computed is None or len(computed[0]) % max(count, 1):
+        raise InvalidInput(f"{path}: the joint influences do not fit its {count} points.")
+    joints = np.asarray(computed[0], np.int64).reshape(count, -1)
+    weights = np.asarray(computed[1], np.float64).reshape(count, -1)
+    own = query.GetJointOrder()
+    if own is not None:
+        order = {str(token): k for k, token in enumerate(skeleton.GetJointOrder())}
+        lost = [str(token) for token in own if str(token) not in order]
+        if lost:
+            raise InvalidInput(f"{path} names the joint {lost[0]!r}, which its skeleton does not have.")
+        joints = np.array([order[str(token)] for token in own])[joints]
+    return joints, weights
+
+
+def _split_unlike(group: IntArray, groups: int, joints: IntArray, weights: FloatArray) -> tuple[IntArray, IntArray]:
+    """Points at one position stay apart where their influences differ, or the skin would tear differently.
+
+    Returns first (p,) the own point behind each skin point and of_source (n,), its skin point.
+    """
+    first = np.full(groups, len(group), np.int64)
+    np.minimum.at(first, group, np.arange(len(group)))
+    alike = (joints == joints[first[group]]).all(axis=1) & (weights == weights[first[group]]).all(axis=1)
+    of_source = group.copy()
+    of_source[~alike] = groups + np.arange(np.count_nonzero(~alike))
+    return np.concatenate([first, np.flatnonzero(~alike)]), of_source
+
+
+def _influences(parts: list[SkinPart]) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
+    """(n, K) joints and weights of the whole skin, weights normalised, and what had to be done for that."""
+    width = max(part.joints.shape[1] for part in parts)
+    joints = np.concatenate([np.pad(part.joints, ((0, 0), (0, width - part.joints.shape[1]))) for part in parts])
+    weights = np.concatenate([np.pad(part.weights, ((0, 0), (0, width - part.weights.shape[1]))) for part in parts])
+    total = weights.sum(axis=1)
+    notes = []
+    loose = total < 1e-6
+    if loose.any():
+        notes.append(f"{np.count_nonzero(loose)} points had no weights and follow the first joint.")
+        weights = np.where(loose[:, None], np.eye(1, width), weights)
+        joints = np.where(loose[:, None], 0, joints)
+        total = np.where(loose, 1.0, total)
+    off = np.abs(total - 1.0) > 1e-4
+    if off.any():
+        notes.append(
+            f"the weights of {np.count_nonzero(off)} points summed to {total.min():.4g}..{total.max():.4g} and were"
+            " normalised; UsdSkel does not do that, so it draws those points elsewhere."
+        )
+    return joints, weights / total[:, None], tuple(notes)
+
+
+def _rest_local(
+    skeleton: UsdSkel.Skeleton, parents: IntArray, bind: FloatArray
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """(j, 4, 4) rest transforms, or those of the bind pose where none are authored."""
+    given = skeleton.GetRestTransformsAttr().Get()
+    if given is not None and len(given) == len(parents):
+        return np.stack([matrix_of(m) for m in given]), ()
+    above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
+    return np.linalg.inv(above) @ bind, ("the skeleton has no rest pose; its bind pose stands in.",)
+
+
+def _freedoms(prim: Usd.Prim, count: int) -> tuple[JointFreedom, ...]:
+    text = prim.GetAttribute(FREEDOMS).Get() if prim.HasAttribute(FREEDOMS) else None
+    if not text:
+        return (JointFreedom(),) * count
+    try:
+        data = json.loads(text)
+        return tuple(freedom_from_json(item) for item in data)
+    except (ValueError, TypeError, KeyError, InvalidInput) as error:
+        raise InvalidInput(f"{FREEDOMS} is damaged: {error}") from error
+
+
+def freedom_from_json(data: dict[str, object]) -> JointFreedom:
+    """A joint's freedom; limits that are null are free."""
+    values = dict(data)
+    for key, free in (("lower", -np.inf), ("upper", np.inf)):
+        values[key] = [free if v is None else v for v in values[key]]  # type: ignore[attr-defined]
+    return JointFreedom(**values)  # type: ignore[arg-type]
+
+
+def freedom_to_json(freedom: JointFreedom) -> dict[str, object]:
+    """JSON has no infinity: a free limit is null."""
+
+    def limits(values: FloatArray | None) -> list[float | None]:
+        return [float(v) if np.isfinite(v) else None for v in (values if values is not None else ())]
+
+    return {
+        "kind": freedom.kind,
+        "order": freedom.order,
+        "translates": freedom.translates,
+        "frame": np.asarray(freedom.frame).tolist(),
+        "lower": limits(freedom.lower),
+        "upper": limits(freedom.upper),
+        "prior_weight": np.asarray(freedom.prior_weight).tolist(),
+        "locked": np.asarray(freedom.locked).tolist(),
+    }
+
+
+def _part_table(parts: list[SkinPart]) -> list[dict[str, object]]:
+    """Where each mesh lies in the skin: path, own points, points and triangles."""
+    return [
+        {"prim": p.path, "own_points": len(p.of_source), "points": len(p.points), "triangles": len(p.faces)}
+        for p in parts
+    ]

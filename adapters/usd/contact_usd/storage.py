@@ -1,0 +1,68 @@
+"""The contact document on a prim of our layer: /Contacts, with ContactDocumentAPI."""
+
+from __future__ import annotations
+
+import base64
+import re
+
+from pxr import Sdf, Usd
+
+from contact_core.errors import FileRefused
+from contact_core.host import StoredDocument
+
+ROOT = Sdf.Path("/Contacts")
+SCHEMA = "ContactDocumentAPI"
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")  # what a text layer might not give back
+_UNIFORM = Sdf.VariabilityUniform
+_ATTRIBUTES = {
+    "contact:document": Sdf.ValueTypeNames.String,
+    "contact:encoding": Sdf.ValueTypeNames.Token,
+    "contact:revision": Sdf.ValueTypeNames.Int64,
+    "contact:schema": Sdf.ValueTypeNames.Int,
+}
+
+
+def read(stage: Usd.Stage) -> StoredDocument | None:
+    """What the stage holds, in whichever layer. Raises FileRefused when it is damaged."""
+    prim = stage.GetPrimAtPath(ROOT)
+    if not prim or not prim.GetAttribute("contact:document").HasAuthoredValue():
+        return None
+    text, encoding, revision, schema = (prim.GetAttribute(name).Get() for name in _ATTRIBUTES)
+    try:
+        data = base64.b64decode(text, validate=True) if encoding == "base64" else text.encode()
+        return StoredDocument(data, int(revision), int(schema))
+    except (ValueError, TypeError, AttributeError) as error:
+        raise FileRefused(f"the contact document on {ROOT} is damaged: {error}") from error
+
+
+def write(layer: Sdf.Layer, document: StoredDocument) -> None:
+    """Replace it, by Sdf: one change for all values."""
+    text, encoding = _as_text(document.data)
+    values = (text, encoding, document.revision, document.schema)
+    with Sdf.ChangeBlock():
+        prim = contacts_prim(layer)
+        applied = Sdf.TokenListOp()
+        applied.prependedItems = [SCHEMA]
+        prim.SetInfo("apiSchemas", applied)
+        for (name, kind), value in zip(_ATTRIBUTES.items(), values, strict=True):
+            attribute = prim.attributes.get(name) or Sdf.AttributeSpec(prim, name, kind, _UNIFORM)
+            attribute.default = value
+
+
+def contacts_prim(layer: Sdf.Layer) -> Sdf.PrimSpec:
+    """/Contacts in our layer: a Scope, defined there if need be."""
+    prim = Sdf.CreatePrimInLayer(layer, ROOT)
+    prim.specifier = Sdf.SpecifierDef
+    prim.typeName = "Scope"
+    return prim
+
+
+def _as_text(data: bytes) -> tuple[str, str]:
+    """Text as it is where a text layer gives it back, else base64."""
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = "\x00"
+    if _CONTROL.search(text):
+        return base64.b64encode(data).decode("ascii"), "base64"
+    return text, "utf-8"
