@@ -10,12 +10,14 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.contact.axis_generator import AxisRequest
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
+from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_geodesic
 from contact_core.job.metrics import bone_segments
-from contact_core.job.recipe import DiskSpec, PatchSpec, PointSpec
+from contact_core.job.recipe import DiskSpec, PatchSpec, PointSpec, RootSpec
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import AXIS_GENERATORS
 from contact_core.pose.rig import Rig
@@ -80,6 +82,17 @@ def bones_of(rig: Rig, points: SurfacePoints) -> tuple[FloatArray, IntArray]:
         weights = points.barycentric[:, corner, None] * rig.skin_weights[corners[:, corner]]  # (n, K)
         np.add.at(strength, (np.arange(len(points))[:, None], rig.skin_joints[corners[:, corner]]), weights)
     return bones, bone_of_joint[strength.argmax(axis=1)]
+
+
+def explicit_root(spec: RootSpec, asset: Asset) -> tuple[SurfacePoints, complex]:
+    """The root (one point) that a recipe gives a patch on the object, and the heading of its axis there."""
+    root = locate(spec.root, asset)
+    if spec.aim is None:
+        return root, complex(direction_to_heading(asset.mesh, root, np.array([spec.direction]))[0])
+    log = log_map(asset.mesh, root, locate(spec.aim, asset))
+    if log.anchor[0] < 0 or not log.distance[0] > 0:
+        raise InvalidInput("the point that a patch aims at must be another point on the same part of the object.")
+    return root, complex(log.coordinates[0]) / float(log.distance[0])
 
 
 def locate(spec: PointSpec, asset: Asset) -> SurfacePoints:

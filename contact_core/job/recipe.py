@@ -74,7 +74,7 @@ class PatchSpec:
     positions: tuple[Vector, ...] = ()
     disk: DiskSpec | None = None
     axis: tuple[PointSpec, ...] = ()
-    generator: str = "along the bone"
+    generator: str = "along_bone"
     generator_options: Mapping[str, Any] = field(default_factory=dict)
     place: RootSpec | None = None
 
@@ -287,7 +287,7 @@ def _patch(table: Table, name: str, joint: str | None) -> PatchSpec:
         positions=table.vectors("positions", ()),
         disk=disk,
         axis=tuple(_point(point, joint) for point in axis.tables("through")) if "through" in axis else (),
-        generator=axis.text("generator", "along the bone"),
+        generator=axis.text("generator", "along_bone"),
         generator_options={k: axis.raw(k) for k in axis.values if k not in ("through", "generator")},
         place=None if place is None else _root(place),
     )

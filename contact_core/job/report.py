@@ -25,6 +25,24 @@ _WORDS = {
 }
 
 
+DEFINITIONS = {
+    "lengths": "distances are fractions of the manipulator's length, the largest rest extent of its skin",
+    "mean_contact_distance": "mean distance of each contact point on the deformed skin to its paired point",
+    "p95_contact_distance": "the distance that 95 % of the contact points keep",
+    "gap": "mean unsigned distance of the contact points on the skin to the object's surface",
+    "opposed_normals": "fraction of pairs with n.n' < 0, normals of the deformed meshes",
+    "opposed_normals_45": "fraction of pairs with n.n' < -0.707",
+    "worst_patch_opposed_45": "the smallest opposed_normals_45 of any patch",
+    "max_penetration": "depth of the deepest skin vertex inside a solid (generalised winding number > 0.5)",
+    "skin_inside": "fraction of the skin's area inside a solid, a third of each face to each corner",
+    "bones_through": "number of bones (joint to child joint) that cross the object's surface",
+    "skin_stretch_p99": "99th percentile over skin edges of posed / rest length",
+    "max_joint_change_deg": "largest rotation of a joint (roots left out) away from rest, degrees",
+    "start_distance": "closest distance of the open hand to the object before the solve",
+    "solids": "the object's surface where it is closed, and a filled proxy (hull) where the recipe asks",
+}
+
+
 @dataclass(frozen=True)
 class Verdict:
     """failures: sentences, one per threshold or patch that fails. failed_patches: by name, why."""

@@ -20,6 +20,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 STEP = np.radians(3.0)
 LAST_RATIO = 0.7  # the last joint of a digit curls more slowly, as tendons make it
 TOUCH = 0.002  # of the bounding box diagonal of the hand: nearer than this is touching
+TURNED, BESIDE = 0.04, 0.008  # hand lengths that a wrong normal of the thumb is worth
 FREE_UPPER = np.radians(100.0)  # for joints without limits
 
 
@@ -73,10 +74,16 @@ def close(hand: HandPose, digit: Sequence[int] | IntArray, step: float = STEP) -
         moving &= hand.theta[dofs] > before
 
 
-def search_thumb(hand: HandPose, digit: Sequence[int] | IntArray, pads: Sequence[SurfacePoints]) -> None:
+def search_thumb(
+    hand: HandPose,
+    digit: Sequence[int] | IntArray,
+    pads: Sequence[SurfacePoints],
+    others: Sequence[SurfacePoints] = (),
+) -> None:
     """Try starts of the thumb's first joint, close each, keep the one whose pads lie best on the object.
 
-    pads: points that should touch; the thumb's last link where there are none.
+    pads: points that should touch; the thumb's last link where there are none. others: the pads of the fingers,
+    which a thumb opposes.
     """
     first, rest = int(digit[0]), list(digit[1:])
     where = hand.chart.rotation_slices[first]
@@ -86,33 +93,48 @@ def search_thumb(hand: HandPose, digit: Sequence[int] | IntArray, pads: Sequence
     )
     fractions = [(0.3, 0.7), (0.1, 0.5, 0.9), (0.05, 0.35, 0.65, 0.95)][3 - len(lower) :]  # twist, spread, flexion
     start = hand.theta.copy()
+    against = _mean_normal(hand, others)
     best: tuple[float, FloatArray] | None = None
     for chosen in itertools.product(*fractions):
         hand.theta = start.copy()
         hand.theta[where] = lower + np.array(chosen) * (upper - lower)
         close(hand, rest)
-        score = _misfit(hand, digit, pads)
+        score = _misfit(hand, digit, pads, against)
         if best is None or score < best[0]:
             best = score, hand.theta.copy()
     if best is not None:
         hand.theta = best[1]
 
 
-def _misfit(hand: HandPose, digit: Sequence[int] | IntArray, pads: Sequence[SurfacePoints]) -> float:
-    """How badly pads lie: mean distance, turned-away normals, and skin of the digit that is inside."""
+def _misfit(
+    hand: HandPose, digit: Sequence[int] | IntArray, pads: Sequence[SurfacePoints], against: FloatArray
+) -> float:
+    """How badly pads lie: mean distance, normals turned away from the object, and to the same side as the fingers'
+    mean normal `against`, skin of the digit that is inside. In lengths of the hand; the factors were found by eye.
+    """
     length = hand.rig.surface.bounding_box_diagonal
     skin = hand.skin()
-    tip = np.array([joint for joint in digit if len(hand.vertices_of(np.array([joint])))][-1:])
     if pads:
         together = SurfacePoints.concatenate(pads)
         points, normals = together.positions(skin), together.normals(skin)
     else:
-        vertices = hand.vertices_of(tip)
+        tip = [joint for joint in digit if len(hand.vertices_of(np.array([joint])))][-1:]
+        vertices = hand.vertices_of(np.array(tip))
         points, normals = skin.points[vertices], skin.vertex_normals[vertices]
     distance, outward = hand.field.sample(points)
-    facing = np.einsum("ki,ki->k", normals, outward)  # -1: the pad looks straight at the object
+    turned = 1.0 + np.einsum("ki,ki->k", normals, outward).mean()  # 0: the pads look straight at the object
+    beside = 1.0 + float(normals.mean(axis=0) @ against)  # 0: straight against the fingers
     inside = hand.field.sample(skin.points[hand.vertices_of(np.array(digit))])[0].min(initial=0.0)
-    return float(np.abs(distance).mean() / length + 0.04 * (1.0 + facing).mean() - 2.0 * min(inside, 0.0) / length)
+    return float((np.abs(distance).mean() - 2.0 * min(inside, 0.0)) / length + TURNED * turned + BESIDE * beside)
+
+
+def _mean_normal(hand: HandPose, pads: Sequence[SurfacePoints]) -> FloatArray:
+    """(3,) unit mean normal of pads on the posed skin, zero without any."""
+    if not pads:
+        return np.zeros(3)
+    skin = hand.skin()
+    mean = np.mean([pad.normals(skin).mean(axis=0) for pad in pads], axis=0)
+    return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-12))
 
 
 def _links(hand: HandPose, joints: list[int]) -> tuple[IntArray, IntArray]:

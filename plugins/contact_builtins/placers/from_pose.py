@@ -10,8 +10,6 @@ Settings (recipe table [placer], beside `name`):
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from contact_builtins.placers.closing import approach, close, search_thumb
@@ -49,7 +47,8 @@ class FromPose:
             close(hand, matching(rig, (pattern,), "placer.close"))
         if thumb is not None:
             joints = matching(rig, (thumb,), "placer.thumb")
-            search_thumb(hand, joints, _pads_on(request.patch_points, dominant_joint(rig), joints, rig.faces))
+            mine, others = _pads_on_and_off(request, joints, dominant_joint(rig))
+            search_thumb(hand, joints, mine, others)
         return place_pads(request, hand, far * manipulator_length(rig), facing=FACING)
 
 
@@ -80,8 +79,13 @@ def _closest(locator: Locator, pad: Pad, facing: float | None) -> tuple[SurfaceP
     return (found.points, float(found.distance[0])) if found.found[0] else None
 
 
-def _pads_on(
-    patches: Mapping[str, SurfacePoints], owner: IntArray, joints: IntArray, faces: IntArray
-) -> list[SurfacePoints]:
-    """The patches that lie mostly on skin of the given joints."""
-    return [points for points in patches.values() if np.isin(owner[faces[points.faces]], joints).mean() > 0.5]
+def _pads_on_and_off(
+    request: PlacementRequest, joints: IntArray, owner: IntArray
+) -> tuple[list[SurfacePoints], list[SurfacePoints]]:
+    """The patches that lie mostly on skin of the given joints, and the others."""
+    mine: list[SurfacePoints] = []
+    others: list[SurfacePoints] = []
+    for points in request.patch_points.values():
+        on = np.isin(owner[request.rig.faces[points.faces]], joints).mean() > 0.5
+        (mine if on else others).append(points)
+    return mine, others

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 
 from contact_builtins.placers.hand_pose import HandPose
 from contact_core.arrays import FloatArray
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.geometry.tracing import trace_geodesic
 from contact_core.plugins.slots import PatchPlacement, PlacementRequest
 

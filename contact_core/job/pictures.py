@@ -1,0 +1,50 @@
+"""The two pictures of a job, before and after, in world space."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contact_core.job.scene import moved, posed_skin
+from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.pose.rig import Pose
+
+if TYPE_CHECKING:
+    from contact_core.job.run import Job
+
+SKIN, THING = (0.87, 0.68, 0.57), (0.72, 0.74, 0.78)
+LINES_PER_PATCH = 14
+
+Rows = tuple[tuple[str, str, bool], ...]
+
+
+def pictures_of(job: Job, rows: Rows) -> list[Picture]:
+    """The manipulator open and away with the contacts painted on both, and posed with the table of results."""
+    away = job.start_distance / job.length
+    before = f"{job.recipe.title or job.recipe.name}: before, {away:.1f} lengths away" if away else "before"
+    verdict = "a grasp" if job.verdict.is_grasp else "NOT a good grasp"
+    after = f"after: {verdict}; {job.metrics['contacts']} contact points, {len(job.solution.theta)} dofs"
+    return [_picture(job, job.start, before, ()), _picture(job, job.pose, after, rows)]
+
+
+def _picture(job: Job, pose: Pose, caption: str, rows: Rows) -> Picture:
+    skin = posed_skin(job.rig, pose)
+    thing = moved(job.object.mesh, job.placed)
+    points, lines = [], []
+    for pair in job.session.pairs():
+        color = job.session.document.patch(pair.pair.manipulator).color
+        here, there = pair.manipulator_points.positions(skin), pair.object_points.positions(thing)
+        points += [(here, color), (there, color)]
+        chosen = np.unique(np.linspace(0, len(here) - 1, LINES_PER_PATCH).astype(int))
+        lines.append((np.stack([here[chosen], there[chosen]], axis=1), color))
+    view = job.recipe.view
+    return Picture(
+        meshes=(PictureMesh(skin, SKIN), PictureMesh(thing, THING)),
+        points=tuple(points),
+        lines=tuple(lines),
+        camera_from=view.camera_from,
+        up=view.up,
+        caption=caption,
+        table=rows,
+    )

@@ -1,0 +1,256 @@
+"""The job: from a recipe to painted contacts, transferred contacts, a solved pose, pictures and a report.
+
+Everything goes through a `Session`, so the document that comes out has the history of an artist's work. Targets
+come from the recipe and its placer; a solved pose never places them, unless the recipe asks to settle contacts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import FloatArray
+from contact_core.document.asset import Asset
+from contact_core.errors import Cancelled, InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.job.assets import object_mesh, read_source, solids_of
+from contact_core.job.metrics import Contact, PosedScene, bone_segments, measure
+from contact_core.job.outputs import write_outputs
+from contact_core.job.painting import axis_picks, explicit_root, paint
+from contact_core.job.recipe import Recipe, load_recipe
+from contact_core.job.report import Verdict, judge
+from contact_core.job.scene import away_pose, coarse_pose, posed_skin, posed_world, world_from_object
+from contact_core.job.solving import solve
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import PLACERS
+from contact_core.plugins.slots import PlacementRequest, PlacementResult
+from contact_core.pose.body import manipulator_length
+from contact_core.pose.rig import Pose, Rig
+from contact_core.pose.solver import PoseSolution
+from contact_core.session import Session
+
+# Called with a fraction 0..1 and a text; False cancels the job.
+JobProgress = Callable[[float, str], bool | None]
+
+HAND, OBJECT = "manipulator", "object"  # names of the two surfaces in the document
+
+
+@dataclass
+class Job:
+    """The workpiece: what the stages of one job know so far."""
+
+    recipe: Recipe
+    session: Session
+    progress: JobProgress | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    manipulator: Asset = field(init=False)
+    object: Asset = field(init=False)  # in the manipulator's units, the recipe's scale applied
+    solids: tuple[TriangleMesh, ...] = field(init=False)
+    placed: FloatArray = field(init=False)  # (4, 4) world_from_object; world is rig space
+    start: Pose = field(init=False)
+    start_distance: float = field(init=False)  # of the open hand to the object, surface units
+    placement: PlacementResult = field(init=False)
+    solution: PoseSolution = field(init=False)
+    pose: Pose = field(init=False)
+    metrics: dict[str, Any] = field(init=False)
+    verdict: Verdict = field(init=False)
+
+    @property
+    def rig(self) -> Rig:
+        assert self.manipulator.rig is not None
+        return self.manipulator.rig
+
+    @cached_property
+    def length(self) -> float:
+        """The manipulator's length: everything is free in a job, so that of the whole skin (surface units)."""
+        return manipulator_length(self.rig)
+
+    @contextmanager
+    def stage(self, name: str, fraction: float, text: str) -> Iterator[None]:
+        """One stage: tell the user, take the time."""
+        self.tell(fraction, text)
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - began
+
+    def tell(self, fraction: float, text: str) -> None:
+        """Report progress. Raises Cancelled when the user wants to stop."""
+        if self.progress is not None and self.progress(fraction, text) is False:
+            raise Cancelled("the job was cancelled; nothing was written.")
+
+
+@dataclass(frozen=True, eq=False)
+class JobResult:
+    """What a job came to. report: the content of report.json. files: what was written, by role."""
+
+    recipe: Recipe
+    report: Mapping[str, Any]
+    verdict: Verdict
+    files: Mapping[str, Path]
+    table: tuple[tuple[str, str, bool], ...]
+
+
+def run_recipe(
+    path: Path | str, out: Path | str, *, plugins: PluginManager | None = None, progress: JobProgress | None = None
+) -> JobResult:
+    """Run a recipe file and write its results into `out`. Raises ContactError; then nothing is half-written."""
+    return run(load_recipe(Path(path)), out, plugins=plugins, progress=progress)
+
+
+def run(
+    recipe: Recipe,
+    out: Path | str,
+    *,
+    plugins: PluginManager | None = None,
+    progress: JobProgress | None = None,
+) -> JobResult:
+    """Run a recipe and write document, pose, posed model, pictures and report into `out`."""
+    with Session(discover=plugins is None) as session:
+        job = Job(recipe, session, progress)
+        offered = plugins or session.plugins
+        _read(job, offered)
+        _paint(job, offered)
+        _place(job, offered)
+        _solve(job, offered)
+        return write_outputs(job, Path(out), offered)
+
+
+def _read(job: Job, plugins: PluginManager) -> None:
+    recipe = job.recipe
+    with job.stage("read", 0.0, "Reading the manipulator and the object"):
+        job.manipulator = read_source(recipe.manipulator, plugins, recipe.folder)
+        if job.manipulator.rig is None:
+            raise InvalidInput(
+                f"the manipulator {job.manipulator.name} has no skeleton; a recipe poses a skinned one."
+            )
+        unit = job.rig.meters_per_unit
+        raw = read_source(recipe.object.source, plugins, recipe.folder)
+        mesh = object_mesh(raw, recipe.object, unit)
+        job.object = Asset(
+            f"{raw.name} (object)" if raw.name == job.manipulator.name else raw.name, mesh, None,
+            raw.source_vertices, raw.source_faces, unit, raw.up_axis, raw.notes, raw.details,
+        )  # fmt: skip
+        job.solids = solids_of(mesh, recipe.object)
+        job.placed = world_from_object(recipe.coarse, mesh)
+        job.session.add_surface(HAND, job.manipulator.mesh, meters_per_unit=unit, rig=job.rig)
+        job.session.add_surface(OBJECT, mesh, meters_per_unit=unit, world_from_surface=job.placed)
+        job.notes += [f"{asset.name}: {note}" for asset in (job.manipulator, raw) for note in asset.notes]
+
+
+def _paint(job: Job, plugins: PluginManager) -> None:
+    with job.stage("parameterize", 0.1, "Painting contacts on the manipulator"):
+        drawn: dict[str, SurfacePoints] = {}
+        for spec in job.recipe.patches:
+            points = paint(spec, job.manipulator)
+            drawn[spec.name] = axis_picks(spec, job.manipulator, points, drawn, plugins)
+            job.session.paint(spec.name, points, surface=HAND, axis=drawn[spec.name])
+
+
+def _place(job: Job, plugins: PluginManager) -> None:
+    recipe, session = job.recipe, job.session
+    with job.stage("transfer", 0.3, "Placing the contacts on the object"):
+        own = {spec.name: spec.place for spec in recipe.patches if spec.place is not None}
+        names = [spec.name for spec in recipe.patches if spec.name not in own]
+        pose = coarse_pose(job.rig, recipe.coarse)
+        job.placement = PlacementResult({}, {}, pose)
+        if names:
+            job.placement = place_from(job, plugins, names, recipe.placer, pose, recipe.placer_options)
+        for name, place in job.placement.placed.items():
+            _transfer(session, name, place.root, direction=place.direction)
+        for name, root in own.items():
+            point, heading = explicit_root(root, job.object)
+            _transfer(session, name, point, heading=heading)
+        if not session.document.pairs:
+            reasons = "; ".join(f"{name}: {why}" for name, why in job.placement.left_out.items())
+            raise InvalidInput(f"the hand is not near the object, no contact found a place ({reasons}).")
+        job.start, job.start_distance = _start(job)
+        session.set_pose(HAND, job.start, title="Start")
+
+
+def place_from(
+    job: Job, plugins: PluginManager, names: list[str], placer: str, pose: Pose, options: Mapping[str, Any]
+) -> PlacementResult:
+    """Ask a placer for roots and directions of patches, the manipulator being in `pose`."""
+    request = PlacementRequest(
+        rig=job.rig,
+        pose=pose,
+        object_mesh=job.object.mesh,
+        object_from_rig=np.asarray(np.linalg.inv(job.placed)),
+        patch_points={name: job.session.points(name) for name in names},
+        patch_axes={name: job.session.axis(name).points for name in names},
+        options=options,
+    )
+    return plugins.get(PLACERS, placer).place(request)
+
+
+def target(name: str) -> str:
+    """Name of the copy of a patch on the object."""
+    return f"{name} on {OBJECT}"
+
+
+def _transfer(session: Session, name: str, point: SurfacePoints, **heading: Any) -> None:
+    copy = session.transfer(name, OBJECT, point, name=target(name), **heading)
+    session.recolor(copy, session.document.patch(name).color)
+    session.pair(name, copy, name=name)
+
+
+def _start(job: Job) -> tuple[Pose, float]:
+    """Where the solve starts: the open hand away from the object, or the placer's coarse pose."""
+    recipe = job.recipe
+    direction = recipe.away_direction or tuple(-x for x in recipe.placer_options.get("approach", (0.0, 0.0, -1.0)))
+    pose, distance = away_pose(
+        job.rig, job.placed, job.object.mesh, np.array(direction, float), recipe.away * job.length
+    )
+    if recipe.solve.start == "coarse" and job.placement.pose is not None:
+        return job.placement.pose, 0.0
+    return pose, distance
+
+
+def _solve(job: Job, plugins: PluginManager) -> None:
+    with job.stage("solve", 0.45, "Solving the pose"):
+        job.solution, job.pose = solve(job, plugins)
+        for _ in range(job.recipe.solve.settle):
+            _settle(job, plugins)
+            job.solution, job.pose = solve(job, plugins, again=True)
+        job.session.set_pose(HAND, job.pose, title="Solve")
+    job.tell(0.7, "Measuring")
+    job.metrics = measure(posed_scene(job, job.pose))
+    job.verdict = judge(job.metrics, job.placement.left_out, job.recipe.accept)
+
+
+def _settle(job: Job, plugins: PluginManager) -> None:
+    """Each contact to the closest facing point of the solved pose: the recipe asked for it."""
+    names = list(job.session.document.pairs)
+    settled = place_from(job, plugins, names, "from pose", job.pose, {"far": 0.2})
+    for name, place in settled.placed.items():
+        job.session.place(target(name), place.root, direction=place.direction)
+
+
+def posed_scene(job: Job, pose: Pose) -> PosedScene:
+    """What the metrics look at, for one pose."""
+    into_object = np.asarray(np.linalg.inv(job.placed))
+    pairs = {geometry.pair.name: geometry for geometry in job.session.pairs()}
+    return PosedScene(
+        rest=job.manipulator.mesh,
+        skin=posed_skin(job.rig, pose, job.placed),
+        bones=bone_segments(job.rig.parents, into_object @ posed_world(job.rig, pose)),
+        rest_local=job.rig.rest_local,
+        local=pose.local[[pose.joints.index(name) for name in job.rig.joints]],
+        moving=job.rig.parents >= 0,
+        object_mesh=job.object.mesh,
+        solids=job.solids,
+        contacts={name: Contact(pair.manipulator_points, pair.object_points) for name, pair in pairs.items()},
+        length=job.length,
+    )
