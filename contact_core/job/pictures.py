@@ -13,7 +13,7 @@ from contact_core.pose.rig import Pose
 if TYPE_CHECKING:
     from contact_core.job.run import Job
 
-SKIN, THING = (0.87, 0.68, 0.57), (0.72, 0.74, 0.78)
+SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 LINES_PER_PATCH = 14
 
 Rows = tuple[tuple[str, str, bool], ...]

@@ -11,16 +11,19 @@ from contact_core.arrays import FloatArray
 from contact_core.plugins.slots import Picture
 
 FIELD_OF_VIEW = math.radians(28.0)  # vertical; a long lens, as a product photograph has
+TABLE_WIDTH = 0.3  # of the frame, kept clear for the table
 _DEFAULT_FROM = (0.55, 0.4, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """eye, centre: (3,) world. right, up, back: the camera's axes, rows of (3, 3) `camera_from_world`."""
+    """eye, centre: (3,) world. camera_from_world: (3, 3), rows right, up, back. shift: where `centre` is drawn,
+    from -1 (left edge) to 1 (right edge); to the right of the table, where there is one."""
 
     eye: FloatArray
     centre: FloatArray
-    camera_from_world: FloatArray  # (3, 3): right, up, back
+    camera_from_world: FloatArray
+    shift: float = 0.0
     field_of_view: float = FIELD_OF_VIEW
 
 
@@ -38,7 +41,10 @@ def camera_of(picture: Picture, aspect: float) -> Camera:
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     tangent = math.tan(FIELD_OF_VIEW / 2) * 0.88
     offset = seen - middle
-    reach = np.maximum(np.abs(offset[:, 0]) / aspect, np.abs(offset[:, 1])) / tangent + offset[:, 2]  # (n,)
+    shift = TABLE_WIDTH if picture.table else 0.0
+    reach = (
+        np.maximum(np.abs(offset[:, 0]) / (aspect * (1.0 - shift)), np.abs(offset[:, 1])) / tangent + offset[:, 2]
+    )  # (n,)
     distance = max(float(reach.max()), 1e-9)
     centre = middle @ axes
-    return Camera(centre + distance * back, centre, axes)
+    return Camera(centre + distance * back, centre, axes, shift)

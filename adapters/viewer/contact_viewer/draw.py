@@ -65,7 +65,7 @@ def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels
             look = {"scalars": "color", "rgb": True}
         surface.point_data.active_normals_name = "Normals"
         plotter.add_mesh(
-            surface, **look, opacity=item.opacity, smooth_shading=True, ambient=0.26, diffuse=0.85, specular=0.07,
+            surface, **look, opacity=item.opacity, smooth_shading=True, ambient=0.26, diffuse=0.85, specular=0.03,
             specular_power=18,
         )  # fmt: skip
     towards_eye = camera.eye - camera.centre
@@ -84,6 +84,7 @@ def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels
     plotter.camera.position = camera.eye
     plotter.camera.focal_point = camera.centre
     plotter.camera.up = camera.camera_from_world[1]
+    plotter.camera.SetWindowCenter(-camera.shift, 0.0)
     plotter.camera.view_angle = np.degrees(camera.field_of_view)
     plotter.reset_camera_clipping_range()
     _write(plotter, picture, pixels)
@@ -91,7 +92,7 @@ def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels
 
 def _light(plotter: Any, pyvista: Any, axes: Any, centre: Any, distance: float) -> None:
     """A key light from the upper left and a weaker one from the eye."""
-    for direction, strength in ((np.array([-0.45, 0.65, 0.75]), 0.46), (np.array([0.15, 0.0, 1.0]), 0.34)):
+    for direction, strength in ((np.array([-0.45, 0.65, 0.75]), 0.42), (np.array([0.15, 0.0, 1.0]), 0.30)):
         light = pyvista.Light(
             position=centre + distance * (direction @ axes),
             focal_point=centre,

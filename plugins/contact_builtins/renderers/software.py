@@ -73,7 +73,7 @@ class _Canvas:
         """(n, 3) pixel x, pixel y and depth of world points (n, 3)."""
         seen = (points - self.camera.eye) @ self.camera.camera_from_world.T
         depth = np.maximum(-seen[:, 2], 1e-9)
-        x = 0.5 * self.width + self.focal * seen[:, 0] / depth
+        x = 0.5 * self.width * (1.0 + self.camera.shift) + self.focal * seen[:, 0] / depth
         y = 0.5 * self.height - self.focal * seen[:, 1] / depth
         return np.stack([x, y, depth], axis=1)
 
@@ -162,7 +162,7 @@ def _write_text(image: FloatArray, picture: Picture) -> None:
     """Table rows from the top left, the caption along the bottom; red for what failed."""
     scale = max(1, image.shape[0] // 450)
     line = (CELL_HEIGHT + 2) * scale
-    rows = [(f"{name:<22.22} {value}", _ALARM if failed else _INK) for name, value, failed in picture.table]
+    rows = [(f"{name:<23.23} {value}", _ALARM if failed else _INK) for name, value, failed in picture.table]
     for place, (text, ink) in enumerate(rows):
         _stamp(image, text, 8, 8 + place * line, scale, ink)
     _stamp(image, picture.caption, 8, image.shape[0] - line - 4, scale, _INK)
