@@ -54,6 +54,8 @@ def free_root(problem: PoseProblem, index: int) -> int | None:
 def _fit_body(
     problem: PoseProblem, theta: FloatArray, index: int, joint: int, with_normals: bool
 ) -> FloatArray | None:
+    if not problem.contacts:
+        return None
     sources, targets, source_normals, target_normals, weights = _ends(problem, theta, problem.bodies[index].name)
     if weights.sum() <= 0.0:
         return None
@@ -72,30 +74,24 @@ def _fit_body(
 def _ends(
     problem: PoseProblem, theta: FloatArray, body: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """World points and normals of the contacts of `body` with others: its end first; weights (k,)."""
-    from contact_core.pose.skinning import normal_track, point_track
-
-    state = problem.state(theta)
-    parts: list[tuple[FloatArray, ...]] = []
-    for contact in problem.contacts:
-        if (contact.manipulator == body) == (contact.object == body):
-            continue
-        ends = [(contact.manipulator, contact.manipulator_points), (contact.object, contact.object_points)]
-        if contact.object == body:
-            ends.reverse()
-        row = []
-        for name, points in ends:
-            i = problem.body_index(name)
-            rig, first = problem.bodies[i].rig, int(problem.bone_offsets[i])
-            normals = state.vectors(normal_track(rig, points, first))
-            length = np.linalg.norm(normals, axis=1, keepdims=True)
-            row += [state.vectors(point_track(rig, points, first)), normals / np.where(length > 0, length, 1.0)]
-        parts.append((row[0], row[2], row[1], row[3], np.asarray(contact.weights)))
-    if not parts:
-        empty = np.zeros((0, 3))
-        return empty, empty, empty, empty, np.zeros(0)
-    a, b, c, d, e = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return a, b, c, d, e
+    """World points, then normals, of all contacts, those of `body` first; weights (k,), 0 where not its own."""
+    state, pairs = problem.state(theta), problem.pairs
+    mine = np.concatenate([np.full(len(c.weights), c.manipulator == body) for c in problem.contacts])
+    other = np.concatenate([np.full(len(c.weights), c.object == body) for c in problem.contacts])
+    between = mine != other  # a contact of the body with itself does not say where it belongs
+    flipped = (other & between)[:, None]
+    first, second = state.vectors(pairs.manipulator_points), state.vectors(pairs.object_points)
+    first_normal, second_normal = (
+        vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+        for vectors in (state.vectors(pairs.manipulator_normals), state.vectors(pairs.object_normals))
+    )
+    return (
+        np.where(flipped, second, first),
+        np.where(flipped, first, second),
+        np.where(flipped, second_normal, first_normal),
+        np.where(flipped, first_normal, second_normal),
+        np.where(between, pairs.weights, 0.0),
+    )
 
 
 def rigid_fit(

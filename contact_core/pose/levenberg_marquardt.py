@@ -17,6 +17,7 @@ from contact_core.pose.candidates import starting_thetas
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
 from contact_core.pose.state import PoseState
+from contact_core.pose.threads import one_blas_thread
 
 TRIAL_ITERATIONS = 8
 CONTINUED = 2  # how many of the starts go on
@@ -34,7 +35,10 @@ class LevenbergMarquardt:
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
     ) -> PoseSolution:
-        options = options or SolveOptions()
+        with one_blas_thread():
+            return self._solve(problem, options or SolveOptions(), progress)
+
+    def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress | None) -> PoseSolution:
         run = Run(self.name, problem, progress)
         stopped = unsolvable(run)
         if stopped is not None:

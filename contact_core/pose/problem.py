@@ -12,6 +12,7 @@ import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.pose.body import Body, PairedPoints, manipulator_length, uniform_scale
 from contact_core.pose.chart import Chart, Motion
 from contact_core.pose.rig import Pose
@@ -27,12 +28,15 @@ Limits = Literal["rig", "none", "paper"]
 class Pairs:
     """All contact pairs of a problem, one below the other.
 
-    gap: manipulator point minus object point. weights: (k,) sum 1. rows: which rows are whose.
+    manipulator_points, object_points, and their normals: the two ends. gap: the first minus the second.
+    weights: (k,) sum 1. rows: which rows are whose.
     """
 
-    gap: Track
+    manipulator_points: Track
+    object_points: Track
     manipulator_normals: Track
     object_normals: Track
+    gap: Track
     weights: FloatArray
     rows: Mapping[str, slice]
 
@@ -277,22 +281,31 @@ class PoseProblem:
         """The contact pairs as tracks."""
         if not self.contacts:
             raise InvalidInput("the problem has no contacts; pair at least one patch before solving.")
-        gaps, first, second, rows, row = [], [], [], {}, 0
-        for contact in self.contacts:
-            a, b = self.body_index(contact.manipulator), self.body_index(contact.object)
-            ends = ((self.bodies[a].rig, contact.manipulator_points, int(self.bone_offsets[a])),
-                    (self.bodies[b].rig, contact.object_points, int(self.bone_offsets[b])))  # fmt: skip
-            gaps.append(point_track(*ends[0]).combined(point_track(*ends[1]), -1.0))
-            first.append(normal_track(*ends[0]))
-            second.append(normal_track(*ends[1]))
-            rows[contact.name] = slice(row, row + len(contact.manipulator_points))
-            row += len(contact.manipulator_points)
-        weights = np.concatenate([np.asarray(contact.weights) for contact in self.contacts])
+        weights = np.concatenate([contact.weights for contact in self.contacts])
         if weights.sum() <= 0.0:
             raise InvalidInput("all contact weights are zero; give at least one point a weight.")
-        return Pairs(
-            Track.stacked(gaps), Track.stacked(first), Track.stacked(second), weights / weights.sum(), rows
-        )
+        ends = np.cumsum([0, *(len(contact.weights) for contact in self.contacts)])
+        rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(self.contacts)}
+        manipulators = [(contact.manipulator, contact.manipulator_points) for contact in self.contacts]
+        objects = [(contact.object, contact.object_points) for contact in self.contacts]
+        first, first_normals = self._tracks(manipulators)
+        second, second_normals = self._tracks(objects)
+        gap = first.combined(second, -1.0)
+        return Pairs(first, second, first_normals, second_normals, gap, weights / weights.sum(), rows)
+
+    def _tracks(self, ends: Sequence[tuple[str, SurfacePoints]]) -> tuple[Track, Track]:
+        """Points and normals of one end of all pairs; what lies on one body is blended in one go."""
+        owner = np.repeat([self.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
+        points = SurfacePoints.concatenate([points for _, points in ends])
+        order, tracks, normals = [], [], []
+        for index in np.unique(owner):
+            rows = np.flatnonzero(owner == index)
+            rig, first = self.bodies[index].rig, int(self.bone_offsets[index])
+            order.append(rows)
+            tracks.append(point_track(rig, points[rows], first))
+            normals.append(normal_track(rig, points[rows], first))
+        back = np.argsort(np.concatenate(order))
+        return Track.stacked(tracks).rows(back), Track.stacked(normals).rows(back)
 
     @cached_property
     def bound_terms(self) -> dict[str, BoundTerm]:

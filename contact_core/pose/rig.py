@@ -147,6 +147,11 @@ class Rig:
         """The skin in the rest pose: the surface that contacts are painted on."""
         return TriangleMesh(skin(self, self.rest_world), self.faces)
 
+    @cached_property
+    def bound_normals(self) -> FloatArray:
+        """(n, 3) vertex normals of the skin as it was bound."""
+        return TriangleMesh(self.bind_points, self.faces).vertex_normals
+
 
 def forward_kinematics(parents: IntArray, local: FloatArray) -> FloatArray:
     """(j, 4, 4) world_from_joint out of (j, 4, 4) parent_from_joint, parents first."""

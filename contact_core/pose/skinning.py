@@ -19,7 +19,6 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.pose.rig import Rig
 
@@ -97,8 +96,7 @@ def normal_track(rig: Rig, points: SurfacePoints, first_bone: int = 0) -> Track:
     the deformed mesh where the skin bends, equal to it elsewhere.
     """
     check_points(rig, points)
-    bound = TriangleMesh(rig.bind_points, rig.faces)
-    return _blend(rig, points, bound.vertex_normals, outward_carrier(joint_from_bind(rig)), first_bone)
+    return _blend(rig, points, rig.bound_normals, outward_carrier(joint_from_bind(rig)), first_bone)
 
 
 def vertex_track(rig: Rig, vertices: IntArray, first_bone: int = 0) -> Track:

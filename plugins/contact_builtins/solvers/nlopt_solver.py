@@ -13,6 +13,7 @@ from contact_core.errors import InvalidInput, MissingExtra
 from contact_core.pose.candidates import starting_thetas
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.pose.threads import one_blas_thread
 
 
 class NLoptSolver:
@@ -42,7 +43,8 @@ class NLoptSolver:
             return stopped
         starts = starting_thetas(problem, options.candidates).values()
         first = min(starts, key=lambda theta: run.evaluate(theta)[1])
-        return run.solution(_descend(nlopt, getattr(nlopt, algorithm), run, first, options, paper=paper))
+        with one_blas_thread():
+            return run.solution(_descend(nlopt, getattr(nlopt, algorithm), run, first, options, paper=paper))
 
 
 def _descend(

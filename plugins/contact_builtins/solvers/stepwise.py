@@ -11,6 +11,7 @@ from contact_core.pose.levenberg_marquardt import Descent, LevenbergMarquardt
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
 from contact_core.pose.stages import Stage, solve_stages
+from contact_core.pose.threads import one_blas_thread
 
 
 class StagedSolver:
@@ -79,7 +80,10 @@ class MultiStartSolver:
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
     ) -> PoseSolution:
-        options = options or SolveOptions()
+        with one_blas_thread():
+            return self._solve(problem, options or SolveOptions(), progress)
+
+    def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress | None) -> PoseSolution:
         starts = int(options.more.get("starts", 32))
         run = Run(self.name, problem, progress)
         stopped = unsolvable(run)
