@@ -49,6 +49,10 @@ class Extend(BaseCommand):
     coordinates: PatchCoordinates
     weights: FloatArray
 
+    def __post_init__(self) -> None:
+        n = len(self.coordinates)
+        object.__setattr__(self, "weights", frozen(self.weights, np.float64, (n,), "weights of new points"))
+
     def label(self) -> str:
         return f"Paint on {self.patch}"
 
@@ -133,6 +137,9 @@ class Weigh(BaseCommand):
     json_id: ClassVar[str] = "contact.weigh"
     patch: str
     weights: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", frozen(self.weights, np.float64, (None,), "weights of a patch"))
 
     def label(self) -> str:
         return f"Weigh the points of {self.patch}"

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from contact_core.arrays import FloatArray
+import numpy as np
+
+from contact_core.arrays import FloatArray, frozen
 from contact_core.contact.shape import PatchShape
 from contact_core.document.document import ContactDocument, Surface, named
 from contact_core.document.frozen_map import FrozenMap
@@ -87,6 +89,10 @@ class PlaceSurface(BaseCommand):
     json_id: ClassVar[str] = "surface.place"
     surface: str
     world_from_surface: FloatArray
+
+    def __post_init__(self) -> None:
+        matrix = frozen(self.world_from_surface, np.float64, (4, 4), "world_from_surface")
+        object.__setattr__(self, "world_from_surface", matrix)
 
     def label(self) -> str:
         return f"Move {self.surface}"

@@ -1,0 +1,271 @@
+"""The journal: what was acknowledged survives kills, full disks and damage; nothing is deleted; one writer only."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from contact_core.document.schema import dump_document, same_documents
+from contact_core.edit import journal as journals
+from contact_core.edit.commands import SetExtra
+from contact_core.edit.history import History
+from contact_core.edit.journal import encode_line, read_journal, replay
+from contact_core.edit.recovery import journal_path, open_file
+from contact_core.errors import CommandRejected, FileRefused
+from contact_core.session import Session
+from contact_core.testing.random_commands import random_history
+
+posix = pytest.mark.skipif(os.name != "posix", reason="needs fork, SIGKILL and resource limits")
+
+
+def fill(session: Session, seed: int, steps: int = 40) -> None:
+    """Commit a random history in a session."""
+    for step in random_history(seed, steps).steps:
+        session.do(step.command)
+
+
+def act(session: Session, chance: random.Random, number: int) -> None:
+    """One action of a busy artist: mostly edits, some merges, undos, jumps, now and then a save."""
+    kind = chance.random()
+    if kind < 0.70 or not session.history.can_undo:
+        session.do(SetExtra("number", number), merge=kind < 0.15)
+    elif kind < 0.80:
+        session.undo()
+    elif kind < 0.90 and session.history.can_redo:
+        session.redo()
+    elif kind < 0.98:
+        session.goto(chance.choice(session.history.steps).revision)
+    else:
+        session.save()
+
+
+def killed_child(path: Path, seed: int, delay: float) -> int:
+    """Fork a child that acts until it is killed; answers how many actions it acknowledged."""
+    read_end, write_end = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            session, chance = Session.open(path, discover=False), random.Random(seed)
+            os.write(write_end, b".")
+            for number in range(100_000):
+                act(session, chance, number)
+                os.write(write_end, b".")
+        finally:
+            os._exit(1)
+    os.close(write_end)
+    os.read(read_end, 1)  # it is open
+    time.sleep(delay)
+    os.kill(child, signal.SIGKILL)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    acknowledged = 0
+    while chunk := os.read(read_end, 1 << 16):
+        acknowledged += len(chunk)
+    os.close(read_end)
+    return acknowledged
+
+
+@posix
+def test_200_kills_lose_nothing_that_was_acknowledged(tmp_path: Path) -> None:
+    """After each kill the document is the acknowledged one, or that of the one action that was under way."""
+    actions = 0
+    for number in range(200):
+        path = tmp_path / f"{number // 8}.json"  # eight interruptions each, recovered one upon the other
+        before = Session.open(path, discover=False)
+        before._let_go(in_order=False)  # as if it had been killed: the journal goes on
+        twin, chance = Session(before.document, discover=False), random.Random(number)
+        twin.history, twin.path = before.history, tmp_path / "twin" / "saves-go-here.json"
+        acknowledged = killed_child(path, number, random.Random(number).uniform(0.0, 0.004))
+        for k in range(acknowledged):
+            act(twin, chance, k)
+        allowed = [dump_document(twin.document)]
+        act(twin, chance, acknowledged)
+        allowed.append(dump_document(twin.document))
+        recovered = Session.open(path, discover=False)
+        assert dump_document(recovered.document) in allowed, f"kill {number} after {acknowledged} actions"
+        recovered._let_go(in_order=False)
+        actions += acknowledged
+    assert actions > 400, "the children were killed before they did anything"
+
+
+@posix
+def test_a_full_disk_refuses_the_edit_and_keeps_everything(tmp_path: Path) -> None:
+    import resource
+
+    path = tmp_path / "document.json"
+    with Session.open(path, discover=False) as session:
+        fill(session, 1)
+        before, revision = session.document, session.revision
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+        size = journal_path(path).stat().st_size
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size + 20, limits[1]))
+        try:
+            with pytest.raises(FileRefused, match=r"cannot be written: .*The edit was not made"):
+                session.do(SetExtra("big", "x" * 5000))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert session.document is before and session.revision == revision
+        assert journal_path(path).stat().st_size == size
+        session.do(SetExtra("small", 1))  # there is room again, and the journal is still sound
+        wanted = session.document
+    assert same_documents(replay(read_journal(journal_path(path)))[0].document, wanted)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(where=st.floats(0.0, 1.0), bit=st.one_of(st.none(), st.integers(0, 7)))
+def test_damage_loses_nothing_before_it(
+    tmp_path_factory: pytest.TempPathFactory, where: float, bit: int | None
+) -> None:
+    """A bit flipped or the rest cut off: all events on the lines before are there, and the message says so."""
+    path = tmp_path_factory.mktemp("damage") / "document.json"
+    session = Session.open(path, discover=False)
+    fill(session, 2, 12)
+    session._let_go(in_order=False)
+    beside = journal_path(path)
+    raw = bytearray(beside.read_bytes())
+    position = min(int(where * len(raw)), len(raw) - 1)
+    if bit is None:
+        raw = raw[:position]
+    else:
+        raw[position] ^= 1 << bit
+    beside.write_bytes(raw)
+    whole_lines = bytes(raw[:position]).count(b"\n")
+    damaged_file = bytes(raw)
+    with Session.open(path, discover=False) as again:
+        steps = session.history.steps
+        if whole_lines == 0:  # the first line holds the document that it all began from
+            assert any("damaged" in note for note in again.notes) or not raw
+            assert len(again.history.steps) == 0
+        else:
+            assert len(again.history.steps) >= min(whole_lines - 1, len(steps))
+            for recovered, step in zip(again.history.steps, steps, strict=False):
+                assert same_documents(recovered.after, step.after)
+        kept = [p.read_bytes() for p in path.parent.iterdir() if "damaged" in p.name]
+        lost_something = len(again.history.steps) < len(steps)
+        assert not lost_something or damaged_file in kept or not raw or bit is None
+        again.do(SetExtra("after", 1))
+        wanted = again.document
+        again._let_go(in_order=False)
+    with Session.open(path, discover=False) as third:
+        assert same_documents(third.document, wanted)
+
+
+def test_an_interrupted_journal_is_replayed_and_said_so(tmp_path: Path) -> None:
+    path = tmp_path / "document.json"
+    session = Session.open(path, discover=False)
+    fill(session, 3)
+    session.save()
+    session.do(SetExtra("unsaved", [1, 2]))
+    session.undo()
+    session.redo()
+    session._let_go(in_order=False)
+    with Session.open(path, discover=False) as again:
+        assert same_documents(again.document, session.document)
+        assert again.revision == session.revision and len(again.history.steps) == len(session.history.steps)
+        assert "committed steps were recovered" in " ".join(again.notes)
+        again.undo()  # the history came back too
+        assert again.history.is_clean
+
+
+def test_an_orderly_end_leaves_nothing_to_recover(tmp_path: Path) -> None:
+    path = tmp_path / "document.json"
+    with Session.open(path, discover=False) as session:
+        fill(session, 4)
+        session.save()
+        saved = session.document
+    with Session.open(path, discover=False) as again:
+        assert again.notes == () and same_documents(again.document, saved)
+        assert journal_path(path).with_name("document.json.journal.previous").exists()
+
+
+def test_unsaved_edits_come_back_unless_discarded(tmp_path: Path) -> None:
+    path = tmp_path / "document.json"
+    for discard in (False, True):
+        session = Session.open(path, discover=False)
+        session.save()
+        session.do(SetExtra("unsaved", discard))
+        session.close(discard=discard)
+        again = Session.open(path, discover=False)
+        assert ("unsaved" in again.document.extras) != discard
+        again.close(discard=True)
+
+
+def test_a_document_changed_by_others_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "document.json"
+    session = Session.open(path, discover=False)
+    session.save()
+    session.do(SetExtra("mine", 1))
+    session._let_go(in_order=False)
+    other = History(session.history.base)
+    other.do(SetExtra("theirs", 1))
+    path.write_bytes(dump_document(other.document))
+    with Session.open(path, discover=False) as again:
+        assert dict(again.document.extras) == {"theirs": 1}
+        assert "changed by something else" in again.notes[0]
+    kept = path.with_name("document.json.journal.unused-1")
+    assert dict(replay(read_journal(kept))[0].document.extras) == {"mine": 1}
+
+
+def test_the_second_process_is_told_who_holds_it_and_reads_only(tmp_path: Path) -> None:
+    path = tmp_path / "document.json"
+    script = (
+        "import sys, time\n"
+        "from pathlib import Path\n"
+        "from contact_core.edit.recovery import open_file, write_document\n"
+        f"opened = open_file(Path({str(path)!r}))\n"
+        "write_document(opened.path, opened.history.document)\n"
+        "print('open', flush=True)\n"
+        "sys.stdin.read()\n"
+    )
+    holder = subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        assert holder.stdout is not None and holder.stdout.readline() == b"open\n"
+        with Session.open(path, discover=False) as second:
+            assert second.read_only
+            assert f"process {holder.pid} of" in second.notes[0] and "read-only" in second.notes[0]
+            with pytest.raises(CommandRejected, match="read-only"):
+                second.do(SetExtra("a", 1))
+            copy = second.save(tmp_path / "copy.json")  # elsewhere it may go on
+            assert not second.read_only and copy.exists()
+            second.do(SetExtra("a", 1))
+            second.close(discard=True)
+    finally:
+        holder.kill()
+        holder.wait()
+    with Session.open(path, discover=False) as third:  # the lock died with its holder
+        assert not third.read_only
+
+
+def test_flushing_is_batched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Committing does not wait for the disk: a hundred edits in a burst cause a handful of flushes."""
+    calls: list[float] = []
+    real = os.fsync
+    with Session.open(tmp_path / "document.json", discover=False) as session:
+        monkeypatch.setattr(os, "fsync", lambda file: (calls.append(time.monotonic()), real(file))[1])
+        begun = time.monotonic()
+        for number in range(100):
+            session.do(SetExtra("number", number))
+        burst = time.monotonic() - begun
+        deadline = time.monotonic() + 5.0
+        while not calls and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert calls, "nothing was flushed to the disk"
+        assert len(calls) <= 2 + burst / (journals.FLUSH_SECONDS / 2)
+        session.close(discard=True)
+
+
+def test_a_newer_journal_is_refused_and_left_untouched(tmp_path: Path) -> None:
+    path = tmp_path / "document.json"
+    header = encode_line({"journal": "contact-core.journal", "version": 99, "revision": 0, "document": {}})
+    journal_path(path).write_bytes(header)
+    with pytest.raises(FileRefused, match="version 99.*newer contact-core"):
+        open_file(path)
+    assert journal_path(path).read_bytes() == header
