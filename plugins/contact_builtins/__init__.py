@@ -11,7 +11,14 @@ from contact_core.plugins import hookimpl
 
 @hookimpl
 def contact_brushes() -> list[object]:
-    return []
+    return [
+        "contact_builtins.brushes.disk:DiskBrush",
+        "contact_builtins.brushes.disk:Eraser",
+        "contact_builtins.brushes.vertices:VertexBrush",
+        "contact_builtins.brushes.vertices:SelectionBrush",
+        "contact_builtins.brushes.curve:CurveBrush",
+        "contact_builtins.brushes.lasso:LassoBrush",
+    ]
 
 
 @hookimpl
@@ -86,8 +93,16 @@ def contact_renderers() -> list[object]:
 def contact_samples() -> list[object]:
     return [
         "contact_builtins.samples.catalogue:HUMAN_HAND",
+        "contact_builtins.samples.catalogue:WITCH_HAND",
+        "contact_builtins.samples.catalogue:ALIEN_HAND",
+        "contact_builtins.samples.catalogue:TENTACLE",
+        "contact_builtins.samples.catalogue:HUMAN_BODY",
         "contact_builtins.samples.catalogue:MUG",
         "contact_builtins.samples.catalogue:BASEBALL",
+        "contact_builtins.samples.catalogue:SCISSORS",
+        "contact_builtins.samples.catalogue:POLE",
+        "contact_builtins.samples.catalogue:CHAIR",
+        "contact_builtins.samples.catalogue:FLOOR",
     ]
 
 

@@ -1,0 +1,148 @@
+"""Every built-in axis generator keeps the contract; and the laws that are its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contact_builtins.axes.along_bone import AlongBone
+from contact_builtins.axes.consistent import Consistent
+from contact_builtins.axes.farthest_pair import FarthestPair
+from contact_builtins.axes.medial_axis import MedialAxis
+from contact_builtins.axes.principal import Principal
+from contact_core.contact.axis_generator import AxisGenerator, AxisRequest
+from contact_core.errors import InvalidInput
+from contact_core.geometry import SurfacePoints
+from contact_core.testing import meshes
+from contact_core.testing.axis_generator_contract import AxisGeneratorContract, patch, scattered
+
+
+class TestFarthestPair(AxisGeneratorContract):
+    @pytest.fixture
+    def generator(self) -> AxisGenerator:
+        return FarthestPair()
+
+
+class TestMedialAxis(AxisGeneratorContract):
+    @pytest.fixture
+    def generator(self) -> AxisGenerator:
+        return MedialAxis()
+
+
+class TestPrincipal(AxisGeneratorContract):
+    @pytest.fixture
+    def generator(self) -> AxisGenerator:
+        return Principal()
+
+
+class TestConsistent(AxisGeneratorContract):
+    @pytest.fixture
+    def generator(self) -> AxisGenerator:
+        return Consistent()
+
+
+class TestAlongBone(AxisGeneratorContract):
+    cannot = {"without_rig": "it follows a bone, so it refuses in words where there is none"}
+
+    @pytest.fixture
+    def generator(self) -> AxisGenerator:
+        return AlongBone()
+
+
+def strip(angle: float) -> AxisRequest:
+    """Points of a strip of 0.8 x 0.16 in the middle of a flat square, turned by `angle`; the bone lies along x."""
+    mesh = meshes.plane(12)
+    c, s = np.cos(angle), np.sin(angle)
+    random = np.random.default_rng(11)
+    local = (random.random((160, 2)) - 0.5) * [0.8, 0.16]
+    spots = local @ np.array([[c, s], [-s, c]]) + 0.5
+    return AxisRequest(
+        mesh,
+        on_plane(spots),
+        bones=np.array([[[0.0, 0.5, 0.3], [1.0, 0.5, 0.3]]]),
+        bone_of_point=np.zeros(160, np.int64),
+    )
+
+
+def on_plane(spots: np.ndarray) -> SurfacePoints:
+    """Surface points of meshes.plane(12) at positions (k, 2)."""
+    mesh = meshes.plane(12)
+    corners = mesh.points[mesh.faces][:, :, :2]  # (m, 3, 2)
+    to_edges = np.concatenate([corners, np.ones((len(corners), 3, 1))], axis=2)
+    weights = np.einsum("kc,mcb->kmb", np.c_[spots, np.ones(len(spots))], np.linalg.inv(to_edges))
+    inside = weights.min(axis=2).argmax(axis=1)
+    return SurfacePoints(inside, weights[np.arange(len(spots)), inside].clip(0.0))
+
+
+def direction(request: AxisRequest, axis: SurfacePoints) -> np.ndarray:
+    positions = axis.positions(request.mesh)
+    chord = positions[-1] - positions[0]
+    return np.asarray(chord / np.linalg.norm(chord))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.1, 2.3])
+def test_principal_finds_the_long_side(angle: float) -> None:
+    request = strip(angle)
+    found = direction(request, Principal().generate(request))
+    assert abs(found[:2] @ [np.cos(angle), np.sin(angle)]) > np.cos(np.radians(3.0))
+
+
+@pytest.mark.parametrize("angle", [0.4, 1.1])
+def test_along_bone_follows_the_bone_whatever_the_patch(angle: float) -> None:
+    request = strip(angle)
+    assert direction(request, AlongBone().generate(request)) == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+
+
+def test_along_bone_refuses_a_bone_that_stands_upright() -> None:
+    upright = replace(strip(0.0), bones=np.array([[[0.5, 0.5, 0.0], [0.5, 0.5, 1.0]]]))
+    with pytest.raises(InvalidInput, match="stands upright"):
+        AlongBone().generate(upright)
+
+
+def test_the_farthest_pair_is_the_farthest() -> None:
+    request = patch("rough")
+    positions = request.points.positions(request.mesh)
+    ends = FarthestPair().generate(request).positions(request.mesh)
+    widest = np.linalg.norm(positions[:, None] - positions[None], axis=-1).max()
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(widest, rel=1e-12)
+
+
+def test_the_medial_axis_follows_a_bent_band() -> None:
+    random = np.random.default_rng(2)
+    radius, angle = 0.36 + 0.12 * (random.random(700) - 0.5), np.pi * random.random(700)
+    spots = np.stack([0.5 + radius * np.cos(angle), 0.3 + radius * np.sin(angle)], -1)
+    request = AxisRequest(meshes.plane(12), on_plane(spots))
+    axis = MedialAxis().generate(request).positions(request.mesh)[:, :2] - [0.5, 0.3]
+    off = np.abs(np.linalg.norm(axis, axis=1) - 0.36)
+    assert off.max() < 0.03, off  # half the band's half width
+    assert np.abs(np.ptp(np.arctan2(axis[:, 1], axis[:, 0]))) > 0.75 * np.pi
+
+
+def test_consistent_is_parallel_to_the_axis_that_is_drawn() -> None:
+    request = strip(1.1)
+    drawn = on_plane(np.array([[0.2, 0.2], [0.3, 0.1]]))
+    other = on_plane(np.array([[0.75, 0.9], [0.75, 0.2]]))
+    found = Consistent().generate(replace(request, other_axes={"corner": drawn, "beside": other}))
+    assert direction(request, found)[:2] == pytest.approx([0.0, -1.0], abs=1e-6)
+
+
+def test_consistent_needs_no_plane() -> None:
+    """Carried round a tube and back along it, a direction along the tube stays along the tube."""
+    tube = meshes.cylinder(24, 14)
+    along = np.array([0.0, 0.0, 1.0])
+    first = scattered(tube, np.array([0.5, 0.0, 0.5]), np.array([0.4, 0.3, 0.3]), seed=1)
+    second = scattered(tube, np.array([-0.4, 0.3, 1.4]), np.array([0.4, 0.3, 0.3]), seed=2)
+    drawn = AlongBone().generate(replace(first, bones=np.array([[-along, along]])))
+    axis = Consistent().generate(replace(second, other_axes={"first": drawn}))
+    assert direction(second, axis) @ along > np.cos(np.radians(2.0))
+
+
+@pytest.mark.parametrize("generator", [Principal(), MedialAxis(), Consistent(), AlongBone()])
+def test_a_patch_in_two_parts_is_refused(generator: AxisGenerator) -> None:
+    mesh = meshes.copies(meshes.saddle(8), 2)
+    faces = np.array([0, 1, 2, len(mesh.faces) - 1, len(mesh.faces) - 2])
+    request = AxisRequest(mesh, SurfacePoints(faces, np.full((5, 3), 1 / 3)))
+    with pytest.raises(InvalidInput, match="in one piece"):
+        generator.generate(request)
