@@ -16,6 +16,7 @@ from contact_core.geometry.tangent_kernels import (
     ON_VERTEX,
     PI,
     angle_round_vertex,
+    direction_of_next,
     heading_at,
     place,
     vertex_scale,
@@ -29,16 +30,18 @@ from contact_core.geometry.topology_kernels import (
 from contact_core.geometry.window_kernels import (
     B0,
     B1,
+    BLUR,
     COS,
     FREE,
-    GRAZING,
     HALFEDGE,
     HEAP_SIZE,
+    MOST_SLACK,
     OVERFLOW,
     POPS,
     ROOT,
     SIGMA,
     SIN,
+    SLACK,
     SX,
     SY,
     WEDGE,
@@ -85,8 +88,7 @@ def list_targets(
             k = h % 3
             target_floats[t, X + 2 * k], target_floats[t, Y + 2 * k] = x, y
             h_next = following(h)
-            ux = (shape[h, 1] - shape[h, 0]) / shape[h_next, 0]
-            uy = shape[h, 2] / shape[h_next, 0]
+            ux, uy = direction_of_next(h, shape)
             x -= shape[h, 0]
             x, y = x * ux + y * uy, y * ux - x * uy
             h = h_next
@@ -111,7 +113,7 @@ def offer(
 
 @kernel
 def light_targets(
-    w: int, epoch: float, listed: FloatArray, floats: FloatArray, integers: IntArray,
+    w: int, epoch: float, shape: FloatArray, listed: FloatArray, floats: FloatArray, integers: IntArray,
     target_floats: FloatArray, target_integers: IntArray,
 ) -> None:  # fmt: skip
     """Offer the targets of the face that window w enters their straight ways to its root."""
@@ -122,6 +124,7 @@ def light_targets(
     record = floats[w]
     sx, sy = record[SX], record[SY]
     left_x, right_x = record[B0] - sx, record[B1] - sx
+    blur = BLUR * (shape[3 * f, 0] + shape[3 * f + 1, 0] + shape[3 * f + 2, 0])
     t = int(listed[f, 1])
     while t >= 0:
         rx, ry = target_floats[t, X + 2 * k] - sx, target_floats[t, Y + 2 * k] - sy
@@ -129,8 +132,10 @@ def light_targets(
         if miss_left <= 0.0 and miss_right <= 0.0:
             rank = 1.0
         else:
-            span = GRAZING * (abs(rx) + abs(ry))
-            grazes = miss_left <= span * (abs(left_x) - sy) and miss_right <= span * (abs(right_x) - sy)
+            span = abs(rx) + abs(ry)
+            left_ray, right_ray = abs(left_x) - sy, abs(right_x) - sy
+            slack = span * min(max(record[SLACK], blur / min(left_ray, right_ray)), MOST_SLACK)
+            grazes = miss_left <= slack * left_ray and miss_right <= slack * right_ray
             rank = GRAZING_RANK if grazes else math.inf
         if rank < math.inf:
             distance = record[SIGMA] + math.hypot(rx, ry)
@@ -270,7 +275,7 @@ def search(
             if integers[item, HALFEDGE] < 0:
                 return MET_BLOCKED_EDGE, -1 - integers[item, HALFEDGE]
             if not lost_its_claim(item, epoch, twin, claim, floats, integers):
-                light_targets(item, epoch, listed, floats, integers, target_floats, target_integers)
+                light_targets(item, epoch, shape, listed, floats, integers, target_floats, target_integers)
                 propagate(
                     item, bound, epoch, tail, twin, shape, angle_sum, kind, reach, leg, origin, claim,
                     floats, integers, keys, items, state,
@@ -301,7 +306,7 @@ def read_targets(
         headings[t, 0], headings[t, 1] = 1.0, 0.0
         if on == ON_VERTEX:
             distance[t] = distance_at(element, epoch, reach)
-            if distance[t] <= limit:
+            if distance[t] <= limit and distance[t] < math.inf:
                 row[ZX], row[ZY] = leg[element, 0], leg[element, 1]
                 target_integers[t, TARGET_ROOT] = origin[element, 0]
                 target_integers[t, TARGET_WEDGE] = origin[element, 1]
@@ -320,11 +325,11 @@ def read_targets(
                         target_floats, target_integers,
                     )  # fmt: skip
             distance[t] = row[DISTANCE] if row[RANK] < math.inf else math.inf
-            if 0.0 < distance[t] <= limit:
+            if 0.0 < distance[t] <= limit and distance[t] < math.inf:
                 headings[t, 0], headings[t, 1] = heading_at(
                     on, element, target_integers[t, ARRIVAL], row[DX], row[DY], tail, twin, shape, angle_sum, kind
                 )
-        if not distance[t] <= limit:
+        if distance[t] > limit or distance[t] == math.inf:
             anchor[t], distance[t] = -1, math.inf
         else:
             root = target_integers[t, TARGET_ROOT]

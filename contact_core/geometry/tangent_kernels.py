@@ -11,7 +11,7 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, kernel
-from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, preceding
+from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, following, preceding
 
 ON_FACE = constant(0)  # element: face; x, y in the frame of halfedge 3f
 ON_EDGE = constant(1)  # element: the lower-index halfedge; x along it, y = 0
@@ -55,19 +55,25 @@ def _on_edge(h: int, t: float, twin: IntArray, shape: FloatArray) -> tuple[int, 
 
 
 @kernel
+def direction_of_next(h: int, shape: FloatArray) -> tuple[float, float]:
+    """The unit direction of the next halfedge in the frame of h.
+
+    Read from the next one's own record, where h runs from the apex: (apex - head) / length would lose all digits
+    where a short edge follows a long one.
+    """
+    h_next = following(h)
+    return -shape[h_next, 1] / shape[h, 0], shape[h_next, 2] / shape[h, 0]
+
+
+@kernel
 def direction_in_face(h: int, shape: FloatArray) -> tuple[float, float]:
     """The unit direction of halfedge h in the frame of its face."""
     k = h % 3
     if k == 0:
         return 1.0, 0.0
-    base = h - k
-    x, y = shape[base, 1], shape[base, 2]
     if k == 1:
-        x -= shape[base, 0]
-    else:
-        x, y = -x, -y
-    length = shape[h, 0]
-    return x / length, y / length
+        return direction_of_next(h - 1, shape)
+    return -shape[h - 2, 1] / shape[h, 0], -shape[h - 2, 2] / shape[h, 0]
 
 
 @kernel

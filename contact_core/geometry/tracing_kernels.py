@@ -19,6 +19,7 @@ from contact_core.geometry.tangent_kernels import (
     SNAP,
     angle_round_vertex,
     corner_at_angle,
+    direction_of_next,
     heading_at,
     place,
     turned,
@@ -62,12 +63,12 @@ def start_in_face(
 ) -> tuple[int, float, float, float, float]:
     """A walk from inside face f, moved to the frame of a halfedge that it does not leave through."""
     h = 3 * f
-    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    length = shape[h, 0]
     tail_side = dx * (0.0 - y) - dy * (0.0 - x)  # positive: the corner lies left of the ray
     head_side = dx * (0.0 - y) - dy * (length - x)
     if not (tail_side < 0.0 <= head_side):
         return h, x, y, dx, dy
-    ux, uy = (ax - length) / shape[h + 1, 0], ay / shape[h + 1, 0]  # halfedge 3f + 1, from the head
+    ux, uy = direction_of_next(h, shape)
     x, y = turned_back(x - length, y, ux, uy)
     dx, dy = turned_back(dx, dy, ux, uy)
     return h + 1, x, y, dx, dy
@@ -155,17 +156,20 @@ def walk(
         length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
         right = from_vertex or dx * (ay - y) - dy * (ax - x) > 0.0
         if right:  # through the edge from the head to the apex
-            edge, ox, ex, ey = following(h), length, ax - length, ay
+            edge, ox = following(h), length
+            size = shape[edge, 0]
+            ux, uy = direction_of_next(h, shape)
         else:  # through the edge from the tail to the apex
-            edge, ox, ex, ey = preceding(h), 0.0, ax, ay
-        size = shape[edge, 0]
+            edge, ox = preceding(h), 0.0
+            size = shape[edge, 0]
+            ux, uy = ax / size, ay / size
         near = SNAP * size
-        across = dx * ey - dy * ex
+        across = dx * uy - dy * ux
         if across == 0.0:  # along a face without area
             step, t = max((length - x) if dx > 0.0 else x, 0.0), 0.0
         else:
-            step = max(((ox - x) * ey + y * ex) / across, 0.0)
-            t = min(max(((ox - x) * dy + y * dx) / across, 0.0), 1.0)
+            step = max(((ox - x) * uy + y * ux) / across, 0.0)
+            t = min(max(((ox - x) * dy + y * dx) / (across * size), 0.0), 1.0)
         if remaining <= step + near:
             step = min(step, remaining)
             return DONE, h, x + step * dx, y + step * dy, dx, dy, 0.0, line_end
@@ -179,8 +183,7 @@ def walk(
                 return NO_ROOM, h, x, y, dx, dy, remaining, line_end
             record(h, 1.0 - t if right else 0.0, t, line_faces, line_barycentric, line_end)
             line_end += 1
-        x, y = ox + t * ex, t * ey
-        ux, uy = ex / size, ey / size
+        x, y = ox + t * size * ux, t * size * uy
         if t == 0.0 or t == 1.0:
             if t == 1.0:
                 corner = preceding(h)

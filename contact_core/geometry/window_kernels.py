@@ -21,10 +21,12 @@ from contact_core.geometry.jit import constant, kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
+    ON_VERTEX,
     PI,
     angle_round_vertex,
     corner_angle,
     direction_in_face,
+    direction_of_next,
 )
 from contact_core.geometry.topology_kernels import (
     BLOCKED,
@@ -36,9 +38,9 @@ from contact_core.geometry.topology_kernels import (
 )
 
 # Columns of the float record of a window
-B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING = (
+B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING, SLACK = (
     constant(0), constant(1), constant(2), constant(3), constant(4), constant(5), constant(6), constant(7),
-    constant(8),
+    constant(8), constant(9),
 )  # fmt: skip
 # Columns of its integer record. root: source s as -1 - s, or a vertex. wedge: the halfedge in whose frame
 # directions at the root are given. side: which child of its parent it is. A free record links to the next one in
@@ -51,7 +53,12 @@ HEAP_SIZE, FREE, USED, POPS, WINDOWS, OVERFLOW = (
 )  # fmt: skip
 
 EXCESS = 1e-11  # radians by which a vertex must exceed a flat one for paths to bend round it
-GRAZING = 1e-11  # radians by which a ray may miss a vertex or a target and still count as meeting it
+# A ray meets a vertex or a target that it misses by no more than its window's slack, in radians: GRAZING, or what
+# rounding by BLUR of the size of a face did where the interval was nearest to the root. (Rays part at vertices, and
+# every mesh with straight lines has other vertices behind them: without slack these would stay dark.)
+GRAZING = 1e-11
+BLUR = 4e-15
+MOST_SLACK = 1e-6
 SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
 
 
@@ -127,7 +134,7 @@ def lower(
 @kernel
 def cast(
     edge: int, b0: float, b1: float, sx: float, sy: float, sigma: float, cos: float, sin: float,
-    root: int, wedge: int, side: int, split_distance: float, split_crossing: float,
+    root: int, wedge: int, side: int, split_distance: float, split_crossing: float, slack: float,
     bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray, reach: FloatArray,
     floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
 ) -> None:  # fmt: skip
@@ -169,7 +176,7 @@ def cast(
         state[USED] = w + 1
     record = floats[w]
     record[B0], record[B1], record[SX], record[SY], record[SIGMA] = b0, b1, sx, sy, sigma
-    record[COS], record[SIN] = cos, sin
+    record[COS], record[SIN], record[SLACK] = cos, sin, slack
     record[SPLIT_DISTANCE], record[SPLIT_CROSSING] = split_distance, split_crossing
     # a blocked edge waits in the heap like any other: it is refused only when the search really gets there
     integers[w, HALFEDGE] = h if h != BLOCKED else -1 - edge
@@ -195,11 +202,12 @@ def propagate(
     rx, ry = ax - sx, ay - sy  # from the root to the apex
     beyond_left = (b0 - sx) * ry + sy * rx  # positive: the apex lies left of the leftmost ray
     beyond_right = -((b1 - sx) * ry + sy * rx)
-    span = GRAZING * (abs(rx) + ry)
+    span, blur = abs(rx) + ry, BLUR * (length + left_length + right_length)
     left_ray, right_ray = abs(b0 - sx) - sy, abs(b1 - sx) - sy
+    slack = min(max(record[SLACK], blur / min(left_ray, right_ray)), MOST_SLACK)
     left, right = beyond_left <= 0.0, beyond_right <= 0.0
     split_distance, split_crossing = -1.0, 0.0
-    if beyond_left <= span * left_ray and beyond_right <= span * right_ray:
+    if beyond_left <= span * slack * left_ray and beyond_right <= span * slack * right_ray:
         apex = tail[to_left]
         distance = sigma + math.hypot(rx, ry)
         sharp = left and right
@@ -224,18 +232,19 @@ def propagate(
         t1 = left_length if beyond_right <= 0.0 else left_length * sy * b1 / (ax * sy + ay * (b1 - sx))
         cast(
             to_left, t0, t1, sx * ux + sy * uy, sy * ux - sx * uy, sigma, cos * ux - sin * uy, cos * uy + sin * ux,
-            root, wedge, LEFT_CHILD, split_distance, split_crossing,
+            root, wedge, LEFT_CHILD, split_distance, split_crossing, slack,
             bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
         )  # fmt: skip
     if right:  # the same, seen in a mirror that puts the head at the origin
-        fx, fs = length - ax, length - sx
-        ux, uy = fx / right_length, -ay / right_length
+        ux, uy = direction_of_next(h, shape)
+        ux, uy = -ux, -uy
+        fx, fs = right_length * ux, length - sx
         c0, c1 = length - b0, length - b1
         t0 = 0.0 if beyond_left <= 0.0 else right_length - right_length * sy * c0 / (fx * sy + ay * (c0 - fs))
         t1 = right_length if c1 == 0.0 else right_length - right_length * sy * c1 / (fx * sy + ay * (c1 - fs))
         cast(
             to_right, t0, t1, -rx * ux - ry * uy, -ry * ux + rx * uy, sigma, cos * ux - sin * uy, cos * uy + sin *
-            ux, root, wedge, RIGHT_CHILD, split_distance, split_crossing,
+            ux, root, wedge, RIGHT_CHILD, split_distance, split_crossing, slack,
             bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
         )  # fmt: skip
 
@@ -313,17 +322,18 @@ def cast_from_corner(
     opposite = following(h)
     length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
     size = shape[opposite, 0]
+    ux, uy = direction_of_next(h, shape)
+    ux, uy = -ux, -uy
     b0, b1 = 0.0, size  # from the apex to the head
     if a0 > 0.0:
         sin, cos = math.sin(a0), math.cos(a0)
-        b1 = size * (1.0 - length * sin / (cos * ay + sin * (length - ax)))
+        b1 = size * (1.0 - length * sin / (cos * ay + sin * size * ux))
     if a1 < corner:
         sin, cos = math.sin(a1), math.cos(a1)
-        b0 = size * (1.0 - length * sin / (cos * ay + sin * (length - ax)))
-    ux, uy = (length - ax) / size, -ay / size
+        b0 = size * (1.0 - length * sin / (cos * ay + sin * size * ux))
     cast(
         opposite, b0, b1, -ax * ux - ay * uy, -ay * ux + ax * uy, sigma, ux, uy,
-        root, h, ONLY_CHILD, -1.0, 0.0,
+        root, h, ONLY_CHILD, -1.0, 0.0, GRAZING,
         bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
     )  # fmt: skip
 
@@ -340,24 +350,29 @@ def emit_source(
     on: what the source lies on; the face, `base`, or the tail of `base`. No window leaves through its own edges.
     """
     h = base
+    from_x, from_y = x, y
+    corner_x, corner_y = 0.0, 0.0  # the tail of h in the frame of base
     cos, sin = 1.0, 0.0  # from the frame of h to that of base
     for side in range(3):
+        if side == 2 and on == ON_VERTEX:  # known better than by way of the far corner
+            x, y = shape[h, 0], 0.0
         distance = math.hypot(x, y)
         v = tail[h]
         if distance < distance_at(v, epoch, reach):
             lower(
-                v, distance, root, base, -x * cos + y * sin, -x * sin - y * cos, h, x, y,
+                v, distance, root, base, corner_x - from_x, corner_y - from_y, h, x, y,
                 bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
             )  # fmt: skip
         length = shape[h, 0]
         if side == 1 or on == ON_FACE or (side == 2 and on == ON_EDGE):
             cast(
-                h, 0.0, length, length - x, -y, 0.0, -cos, -sin, root, base, ONLY_CHILD, -1.0, 0.0,
+                h, 0.0, length, length - x, -y, 0.0, -cos, -sin, root, base, ONLY_CHILD, -1.0, 0.0, GRAZING,
                 bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
             )  # fmt: skip
         h_next = following(h)
-        ux, uy = (shape[h, 1] - length) / shape[h_next, 0], shape[h, 2] / shape[h_next, 0]
+        ux, uy = direction_of_next(h, shape)
         x -= length
         x, y = x * ux + y * uy, y * ux - x * uy
         cos, sin = cos * ux - sin * uy, cos * uy + sin * ux
+        corner_x, corner_y = (shape[base, 0], 0.0) if side == 0 else (shape[base, 1], shape[base, 2])
         h = h_next

@@ -38,7 +38,7 @@ class Workspace:
 
     def reserve(self, windows: int) -> None:
         """Make room for so many windows at once."""
-        self.floats: FloatArray = np.empty((windows, 9))
+        self.floats: FloatArray = np.empty((windows, 10))
         self.integers: IntArray = np.empty((windows, 4), np.int64)
         self.keys: FloatArray = np.empty(2 * windows)
         self.items: IntArray = np.empty(2 * windows, np.int64)
