@@ -1,0 +1,170 @@
+"""What people do with poses: set angles, blend, mirror, key at frames."""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact_core.arrays import FloatArray
+from contact_core.errors import InvalidInput
+from contact_core.pose.chart import Chart, pose_on
+from contact_core.pose.rig import Pose, Rig, forward_kinematics
+from contact_core.pose.rotations import exponential, nearest_rotation
+
+
+def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:
+    """The pose with some dofs set, by name ("index_1.x", see `Chart.dof_names`): offsets from rest, radians or units.
+
+    Raises InvalidInput for an unknown name, a number that is not finite, and a value beyond its limit.
+    """
+    chart = Chart(rig)
+    theta, leftover = chart.theta_of(pose)
+    for name, value in angles.items():
+        if name not in chart.dof_names:
+            near = [known for known in chart.dof_names if known.split(".")[0] == name.split(".")[0]]
+            raise InvalidInput(
+                f"{rig.name} has no dof {name!r}; near are {', '.join(near or chart.dof_names[:5])}."
+            )
+        dof = chart.dof_names.index(name)
+        if not (math.isfinite(value) and chart.lower[dof] <= value <= chart.upper[dof]):
+            raise InvalidInput(
+                f"{name} of {rig.name} is limited to {chart.lower[dof]:.4g} .. {chart.upper[dof]:.4g}, but"
+                f" {value:.4g} came."
+            )
+        theta[dof] = value
+    return Pose(rig.joints, chart.local(theta, leftover))
+
+
+def blend(rig: Rig, first: Pose, second: Pose, share: float) -> Pose:
+    """The pose between two: rotations along the shortest arc, all else linearly. share: 0 is first, 1 second."""
+    if not math.isfinite(share):
+        raise InvalidInput(f"a blend needs a finite share, but {share} came.")
+    one, two = pose_on(rig, first), pose_on(rig, second)
+    turn_one, rest_one = _split(one)
+    turn_two, rest_two = _split(two)
+    between = (1.0 - share) * rest_one + share * rest_two
+    vectors = _rotation_vectors(turn_one.transpose(0, 2, 1) @ turn_two)
+    turn = turn_one @ exponential(share * vectors)[0]
+    local = between.copy()
+    local[:, :3, :3] = turn @ between[:, :3, :3]
+    return Pose(rig.joints, local)
+
+
+def mirrored_pose(rig: Rig, pose: Pose, *, onto: Rig | None = None, axis: int = 0) -> Pose:
+    """The pose seen in the mirror plane through the origin across `axis` of rig space, left and right by names.
+
+    What a joint turns away from its rest direction, its partner turns in the mirror, so the frames of the joints
+    need not mirror one another. onto: another rig that takes the pose (a left hand's pose for a right hand).
+    A joint whose partner does not exist keeps its own name; raises InvalidInput when none of the joints is found.
+    """
+    target = onto or rig
+    source_of = {mirrored_name(name): name for name in rig.joints} | {
+        name: name for name in rig.joints if mirrored_name(name) not in target.joints
+    }
+    if not any(name in source_of for name in target.joints):
+        raise InvalidInput(f"none of the joints of {target.name} mirrors one of {rig.name}; are they partners?")
+    flip = np.diag([-1.0 if k == axis else 1.0 for k in range(3)])
+    local = pose_on(rig, pose)
+    world, rest = forward_kinematics(rig.parents, local), rig.rest_world
+    answer = np.empty((len(target.joints), 4, 4))  # world_from_joint
+    answer_local = target.rest_local.copy()
+    for j, name in enumerate(target.joints):
+        parent = int(target.parents[j])
+        above = answer[parent] if parent >= 0 else np.eye(4)
+        rest_above = target.rest_world[parent] if parent >= 0 else np.eye(4)
+        if name in source_of:
+            s = rig.joint_index(source_of[name])
+            turned = _turn(world[s]) @ _turn(rest[s]).T
+            answer_turn = flip @ turned @ flip @ _turn(target.rest_world[j])
+            local_turn = _turn(above).T @ answer_turn
+            stretch = _turn(target.rest_local[j]).T @ target.rest_local[j, :3, :3]
+            answer_local[j, :3, :3] = local_turn @ stretch
+            source_parent = int(rig.parents[s])
+            source_rest_above = rest[source_parent] if source_parent >= 0 else np.eye(4)
+            moved = _turn(source_rest_above) @ (local[s, :3, 3] - rig.rest_local[s, :3, 3])
+            answer_local[j, :3, 3] = target.rest_local[j, :3, 3] + _turn(rest_above).T @ flip @ moved
+        answer[j] = above @ answer_local[j]
+    return Pose(target.joints, answer_local)
+
+
+_WORDS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
+_LETTERS = (("l", "r"), ("L", "R"))  # set apart by anything but letters and digits
+
+
+def mirrored_name(name: str) -> str:
+    """The partner's name: "hand_l" of "hand_r", "LeftArm" of "RightArm"; the same name where no side is told."""
+    for pair in _WORDS:
+        for side, other in (pair, pair[::-1]):
+            if side in name:
+                return name.replace(side, other)
+    for pair in _LETTERS:
+        for side, other in (pair, pair[::-1]):
+            found = re.sub(rf"(?<![A-Za-z0-9]){side}(?![A-Za-z0-9])", other, name)
+            if found != name:
+                return found
+    return name
+
+
+@dataclass(frozen=True, eq=False)
+class PoseKeys:
+    """Poses at frames, in order. Immutable: `with_key` answers new keys."""
+
+    rig: str
+    frames: tuple[float, ...] = ()
+    poses: tuple[Pose, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.frames) != len(self.poses) or list(self.frames) != sorted(set(self.frames)):
+            raise InvalidInput(
+                f"keys need one pose per frame and rising frames, but got {len(self.poses)} poses at"
+                f" {list(self.frames)[:6]}."
+            )
+
+    def with_key(self, frame: float, pose: Pose) -> PoseKeys:
+        """These keys with a pose at a frame, replacing the one that is there."""
+        if not math.isfinite(frame):
+            raise InvalidInput(f"a frame is a finite number, but {frame} came.")
+        keys = dict(zip(self.frames, self.poses, strict=True)) | {float(frame): pose}
+        frames = tuple(sorted(keys))
+        return PoseKeys(self.rig, frames, tuple(keys[f] for f in frames))
+
+    def without_key(self, frame: float) -> PoseKeys:
+        """These keys without the one at a frame; raises InvalidInput when there is none."""
+        if frame not in self.frames:
+            raise InvalidInput(f"there is no key at frame {frame:g}; there are {[f'{f:g}' for f in self.frames]}.")
+        keep = [i for i, f in enumerate(self.frames) if f != frame]
+        return PoseKeys(self.rig, tuple(self.frames[i] for i in keep), tuple(self.poses[i] for i in keep))
+
+    def at(self, rig: Rig, frame: float) -> Pose:
+        """The pose at a frame, blended between neighbours and held beyond the ends."""
+        if not self.frames:
+            raise InvalidInput(f"{self.rig} has no keys yet; set one first.")
+        after = bisect_right(self.frames, frame)
+        if after == 0 or after == len(self.frames):
+            return self.poses[min(after, len(self.frames) - 1)]
+        before, then = self.frames[after - 1], self.frames[after]
+        return blend(rig, self.poses[after - 1], self.poses[after], (frame - before) / (then - before))
+
+
+def _turn(transform: FloatArray) -> FloatArray:
+    """(3, 3) the rotation part of (4, 4)."""
+    return nearest_rotation(transform[:3, :3])
+
+
+def _split(local: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rotations (j, 3, 3), and the transforms (j, 4, 4) with them taken out of the linear part."""
+    turn = np.array([_turn(one) for one in local]).reshape(-1, 3, 3)
+    rest = local.copy()
+    rest[:, :3, :3] = turn.transpose(0, 2, 1) @ local[:, :3, :3]
+    return turn, rest
+
+
+def _rotation_vectors(rotations: FloatArray) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(rotations).as_rotvec())
