@@ -362,7 +362,7 @@ class HostContract(Contract):
         rng = np.random.default_rng(20261122)
         foreign = not {"foreign_edits", "H28"} & set(self.cannot)
         states, at = [self.scene_state(host)], 0
-        for revision in range(1, 61):
+        for revision in range(1, 41):
             what = rng.choice(["step", "undo", "redo", "foreign"], p=[0.35, 0.3, 0.2, 0.15])
             if what == "undo":
                 assert host.undo() == (at > 0)
@@ -375,6 +375,8 @@ class HostContract(Contract):
                 states[at + 1 :] = [self.scene_state(host)]
                 at += 1
             assert self.scene_state(host) == states[at], (revision, what)
+        assert [host.undo() for _ in range(at + 1)] == [True] * at + [False]
+        assert self.scene_state(host) == states[0]
 
     # What only some hosts have
 
@@ -401,8 +403,9 @@ class HostContract(Contract):
 
     @needs("picking")
     def test_h32_rays_go_where_the_pixels_look(self, host: Any) -> None:
-        """Rays have unit directions; those through the middle meet what is shown, those through a corner do not."""
-        host.show(picture_of(host, "plain"))
+        """Rays are unit; those through the middle meet what is shown, those at the rim do not; y is down."""
+        picture = picture_of(host, "plain")
+        host.show(picture)
         width, height = host.viewport
         origins, directions = host.rays([[width / 2, height / 2], [0.5, 0.5], [width - 0.5, height / 2]])
         np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-6)
@@ -412,6 +415,8 @@ class HostContract(Contract):
             origins @ local[:3, :3].T + local[:3, 3], directions @ local[:3, :3].T
         )
         assert (hits.faces >= 0).tolist() == [True, False, False]
+        _, (above, below) = host.rays([[width / 2, 0.0], [width / 2, float(height)]])
+        assert above @ picture.up > below @ picture.up
 
     @needs("progress")
     def test_h33_progress_asks_to_go_on(self, host: Any) -> None:

@@ -15,7 +15,7 @@ class TestExactEngine(EngineContract):
 
 
 class TestVectorHeatEngine(EngineContract):
-    cannot = {  # noqa: RUF012 - declared by the contract as a ClassVar
+    cannot = {
         "never_shorter_than_the_chord": "beyond the cut locus its logarithm blends both sides and comes out short",
     }
 

@@ -1,0 +1,10 @@
+"""What the USD adapter offers to the core, by reference, so that nothing imports pxr before it is used."""
+
+from __future__ import annotations
+
+from contact_core.plugins import hookimpl
+
+
+@hookimpl
+def contact_hosts() -> list[object]:
+    return ["contact_usd.host:UsdHost"]

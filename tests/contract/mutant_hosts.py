@@ -1,0 +1,495 @@
+"""Memory hosts that are broken on purpose, each in one way; `test_host_mutants.py` sees them caught.
+
+Each fails first at the clause that it `breaks`, and beyond that only at declared consequences.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from contact_core.document.asset import Asset
+from contact_core.errors import FileRefused
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.placement import split_world_from_local
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.host import SceneObject, SceneSpace, StoredDocument
+from contact_core.memory_host import MemoryHost
+from contact_core.pose.rig import Pose
+from contact_core.testing.host_contract import Build, HostContract
+from contact_core.testing.host_scenes import HostScene
+from contact_core.testing.mutants import Mutant
+
+_spec = importlib.util.spec_from_file_location("memory_subject", Path(__file__).with_name("test_memory_host.py"))
+assert _spec is not None and _spec.loader is not None
+_subject = importlib.util.module_from_spec(_spec)
+sys.modules.setdefault("memory_subject", _subject)
+_spec.loader.exec_module(_subject)
+
+
+class OnMemory(HostContract):
+    """A subject that builds the nested class `Host`."""
+
+    Host: ClassVar[type[MemoryHost]] = MemoryHost
+
+    @pytest.fixture
+    def build(self) -> Build:
+        return lambda scene: _subject.build_in_memory(scene, self.Host)
+
+    foreign_edit = _subject.TestMemoryHost.foreign_edit
+
+    def scene_state(self, host: MemoryHost) -> Any:
+        """As much as the mutants get wrong, without reading surfaces each time."""
+        items = host.scene.objects.values()
+        poses = [host.read_pose(item.id).local.tobytes() for item in host.objects() if item.kind == "rig"]
+        return [(item.name, item.world.tobytes(), item.keys) for item in items], poses, host.stored_document()
+
+
+class TestTakesEverythingForMetres(Mutant, OnMemory):
+    breaks = "H01"
+
+    class Host(MemoryHost):
+        def space(self) -> SceneSpace:
+            return replace(super().space(), meters_per_unit=1.0)
+
+
+class TestListsSkinsAgain(Mutant, OnMemory):
+    breaks = "H02"
+    consequences = ("H20",)
+
+    class Host(MemoryHost):
+        def objects(self) -> tuple[SceneObject, ...]:
+            rigs = [item for item in super().objects() if item.kind == "rig"]
+            return (*super().objects(), *(SceneObject(item.id, f"{item.name}_skin", "surface") for item in rigs))
+
+
+class TestTurnsThePointOrderRound(Mutant, OnMemory):
+    breaks = "H03"
+    consequences = ("H06", "H07", "H08", "H30", "H34")
+
+    class Host(MemoryHost):
+        def read_surface(self, object_id: str) -> Asset:
+            asset = super().read_surface(object_id)
+            if asset.rig is not None:
+                return asset
+            mesh = TriangleMesh(asset.mesh.points[::-1], len(asset.mesh.points) - 1 - asset.mesh.faces)
+            return replace(asset, mesh=mesh)
+
+
+class TestCutsPolygonsIntoFans(Mutant, OnMemory):
+    breaks = "H04"
+    consequences = ("H06", "H07")  # a fan over a concave cap encloses another volume
+
+    class Host(MemoryHost):
+        def read_surface(self, object_id: str) -> Asset:
+            asset = super().read_surface(object_id)
+            if asset.rig is not None:
+                return asset
+            polygons = self.scene.objects[object_id].shape
+            corners = np.split(polygons.face_indices, np.cumsum(polygons.face_sizes)[:-1])
+            fans = [[c[0], c[k], c[k + 1]] for c in corners for k in range(1, len(c) - 1)]
+            sources = [f for f, c in enumerate(corners) for _ in range(len(c) - 2)]
+            faces = np.array(fans)
+            if split_world_from_local(self.scene.objects[object_id].world).mirrored:
+                faces = faces[:, ::-1]
+            return replace(asset, mesh=TriangleMesh(asset.mesh.points, faces), source_faces=np.array(sources))
+
+
+class TestBakesTheMotionIn(Mutant, OnMemory):
+    breaks = "H05"
+    consequences = ("H14", "H34")
+
+    class Host(MemoryHost):
+        def read_surface(self, object_id: str) -> Asset:
+            asset = super().read_surface(object_id)
+            place = super().placement(object_id)
+            points = asset.mesh.points @ place[:3, :3].T + place[:3, 3]
+            return replace(asset, mesh=asset.mesh.with_points(points))
+
+        def placement(self, object_id: str, frame: float | None = None) -> Any:
+            return np.eye(4)
+
+
+class TestLosesTheScale(Mutant, OnMemory):
+    breaks = "H06"
+    consequences = ("H07", "H08", "H34")
+
+    class Host(MemoryHost):
+        def read_surface(self, object_id: str) -> Asset:
+            asset = super().read_surface(object_id)
+            stretch = split_world_from_local(self.scene.objects[object_id].world).surface_from_local
+            if asset.rig is not None:
+                return asset
+            return replace(asset, mesh=asset.mesh.with_points(asset.mesh.points @ np.linalg.inv(stretch).T))
+
+
+class TestTurnsMirroredSurfacesInsideOut(Mutant, OnMemory):
+    breaks = "H07"
+
+    class Host(MemoryHost):
+        def read_surface(self, object_id: str) -> Asset:
+            asset = super().read_surface(object_id)
+            if not split_world_from_local(self.scene.objects[object_id].world).mirrored:
+                return asset
+            return replace(asset, mesh=TriangleMesh(asset.mesh.points, asset.mesh.faces[:, ::-1]))
+
+
+class TestForgetsParents(Mutant, OnMemory):
+    breaks = "H08"
+
+    @pytest.fixture
+    def build(self) -> Build:
+        def orphaned(scene: HostScene) -> MemoryHost:
+            meshes = tuple(replace(mesh, parent=None) for mesh in scene.meshes)
+            return _subject.build_in_memory(replace(scene, meshes=meshes), self.Host)
+
+        return orphaned
+
+
+class TestGivesNewIdsAtEachOpening(Mutant, OnMemory):
+    breaks = "H09"
+    consequences = ("H20",)
+
+    class Host(MemoryHost):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            tag = uuid.uuid4().hex
+            objects = {f"{key}-{tag}": item for key, item in self._scene.objects.items()}
+            self._scene = replace(self._scene, objects=objects)
+            self._states = [("open", self._scene)]
+
+    def foreign_edit(self, host: MemoryHost) -> None:
+        plain = next(item.id for item in host.objects() if item.name == "plain")
+        farther = host.placement(plain).copy()
+        farther[0, 3] += 1.0
+        host.move(plain, farther)
+
+
+class TestInventsObjects(Mutant, OnMemory):
+    breaks = "H10"
+
+    class Host(MemoryHost):
+        def read_surface(self, object_id: str) -> Asset:
+            known = object_id if object_id in self.scene.objects else next(iter(self.scene.objects))
+            return super().read_surface(known)
+
+
+class TestWantsAScreen(Mutant, OnMemory):
+    breaks = "H11"
+
+    @pytest.fixture(autouse=True)
+    def screen(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("DISPLAY", ":0")
+
+    class Host(MemoryHost):
+        def objects(self) -> tuple[SceneObject, ...]:
+            if "DISPLAY" not in os.environ:
+                raise RuntimeError("cannot open display")
+            return super().objects()
+
+
+class TestTransposesRestFrames(Mutant, OnMemory):
+    breaks = "H12"
+    consequences = ("H13", "H14", "H16", "H34")
+
+    class Host(MemoryHost):
+        def read_rig(self, object_id: str) -> Asset:
+            asset = super().read_rig(object_id)
+            assert asset.rig is not None
+            rest = np.array(asset.rig.rest_local)
+            rest[:, :3, :3] = rest[:, :3, :3].transpose(0, 2, 1)
+            return replace(asset, rig=replace(asset.rig, rest_local=rest))
+
+
+class TestBindsInTheWrongPose(Mutant, OnMemory):
+    breaks = "H13"
+    consequences = ("H16",)  # another rest surface
+
+    class Host(MemoryHost):
+        def read_rig(self, object_id: str) -> Asset:
+            asset = super().read_rig(object_id)
+            assert asset.rig is not None
+            bind = np.array(asset.rig.bind_world)
+            bind[1:, :3, 3] += 0.01
+            return replace(asset, rig=replace(asset.rig, bind_world=bind))
+
+
+class TestLosesTheScaleOfRigs(Mutant, OnMemory):
+    breaks = "H14"
+
+    class Host(MemoryHost):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            objects = {key: self._unscaled(item) for key, item in self._scene.objects.items()}
+            self._scene = replace(self._scene, objects=objects)
+            self._states = [("open", self._scene)]
+
+        @staticmethod
+        def _unscaled(item: Any) -> Any:
+            if item.kind == "surface":
+                return item
+            return replace(item, world=split_world_from_local(item.world).world_from_surface)
+
+
+class TestLeavesThePoseItSkinned(Mutant, OnMemory):
+    breaks = "H15"
+
+    class Host(MemoryHost):
+        def skin_points(self, object_id: str, pose: Pose) -> Any:
+            self.write_pose(object_id, pose)
+            return super().skin_points(object_id, pose)
+
+
+class TestForgetsTheScaleInPoses(Mutant, OnMemory):
+    breaks = "H16"
+
+    class Host(MemoryHost):
+        def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+            item = self.scene.objects[object_id]
+            self._put("Pose", object_id, item.with_pose(pose, frame))
+
+
+class TestResetsOtherJoints(Mutant, OnMemory):
+    breaks = "H17"
+
+    class Host(MemoryHost):
+        def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+            with self.step("Pose"):
+                super().write_pose(object_id, Pose.rest(self.read_rig(object_id).rig), frame)  # type: ignore[arg-type]
+                super().write_pose(object_id, pose, frame)
+
+
+class TestKeysTheNextFrame(Mutant, OnMemory):
+    breaks = "H18"
+    consequences = ("H20",)
+
+    class Host(MemoryHost):
+        def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+            super().write_pose(object_id, pose, None if frame is None else frame + 1.0)
+
+
+class TestKeysEveryFrameBefore(Mutant, OnMemory):
+    breaks = "H18"
+    consequences = ("H20",)
+
+    class Host(MemoryHost):
+        def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+            with self.step("Pose"):
+                super().write_pose(object_id, pose, frame)
+                if frame is not None:
+                    super().write_pose(object_id, pose, 0.0)
+
+
+class TestTakesDocumentsForText(Mutant, OnMemory):
+    breaks = "H19"
+
+    class Host(MemoryHost):
+        def store_document(self, document: StoredDocument) -> None:
+            text = document.data.decode("utf-8", errors="replace")
+            super().store_document(replace(document, data=text.encode()))
+
+
+class TestSavesWithoutTheDocument(Mutant, OnMemory):
+    breaks = "H20"
+    consequences = ("H22",)
+
+    class Host(MemoryHost):
+        def save(self, path: Path | None = None) -> None:
+            whole, self._scene = self._scene, replace(self._scene, document=None)
+            try:
+                super().save(path)
+            finally:
+                self._scene = whole
+
+
+class TestEatsDocumentsOfTheFuture(Mutant, OnMemory):
+    breaks = "H21"
+
+    class Host(MemoryHost):
+        def store_document(self, document: StoredDocument) -> None:
+            with self.step("Document"):
+                self._scene = replace(self._scene, document=document)
+
+
+class TestDropsDocumentsOfTheFutureOnSave(Mutant, OnMemory):
+    breaks = "H22"
+
+    class Host(MemoryHost):
+        def save(self, path: Path | None = None) -> None:
+            whole = self._scene
+            if whole.document is not None and whole.document.schema > 1:
+                self._scene = replace(whole, document=None)
+            try:
+                super().save(path)
+            finally:
+                self._scene = whole
+
+
+class TestOpensHalfAFile(Mutant, OnMemory):
+    breaks = "H23"
+
+    class Host(MemoryHost):
+        def __init__(self, path: Path | None = None, **options: Any) -> None:
+            try:
+                super().__init__(path, **options)
+            except FileRefused:
+                super().__init__(**options)
+
+
+class TestMakesTwoStepsOfOne(Mutant, OnMemory):
+    breaks = "H24"
+    consequences = ("H25", "H26", "H28", "H29")
+
+    class Host(MemoryHost):
+        @contextmanager
+        def step(self, label: str) -> Iterator[None]:
+            if not label.startswith("Step"):
+                with super().step(label):
+                    yield
+                return
+            yield  # what is written inside makes steps of its own
+
+
+class TestKeepsAStalePoseAfterUndo(Mutant, OnMemory):
+    breaks = "H24"
+    consequences = ("H28", "H29")
+
+    class Host(MemoryHost):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            self.cached: dict[str, Pose] = {}
+
+        def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+            super().write_pose(object_id, pose, frame)
+            self.cached[object_id] = super().read_pose(object_id, None)
+
+        def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
+            if frame is None and object_id in self.cached and self._depth == 0 and self._at < self.last:
+                return self.cached[object_id]
+            return super().read_pose(object_id, frame)
+
+        @property
+        def last(self) -> int:
+            return len(self._states) - 1
+
+
+class TestTellsBeforeItUndoes(Mutant, OnMemory):
+    breaks = "H25"
+
+    class Host(MemoryHost):
+        def _go(self, by: int) -> bool:
+            listeners, self._listeners = self._listeners, []
+            if 0 <= self._at + by < len(self._states):
+                for listener in listeners:
+                    listener()
+            moved = super()._go(by)
+            self._listeners = listeners
+            return moved
+
+
+class TestKeepsWhatFailed(Mutant, OnMemory):
+    breaks = "H26"
+
+    class Host(MemoryHost):
+        @contextmanager
+        def step(self, label: str) -> Iterator[None]:
+            failure: BaseException | None = None
+            with super().step(label):
+                try:
+                    yield
+                except ZeroDivisionError as error:
+                    failure = error
+            if failure is not None:
+                raise failure
+
+
+class TestMakesStepsOfReading(Mutant, OnMemory):
+    breaks = "H27"
+    consequences = ("H31",)
+
+    class Host(MemoryHost):
+        def read_surface(self, object_id: str) -> Asset:
+            with self.step("Read"):
+                self._scene = replace(self._scene)
+            return super().read_surface(object_id)
+
+
+class TestLeavesForeignEditsOut(Mutant, OnMemory):
+    breaks = "H28"
+    consequences = ("H29",)
+
+    class Host(MemoryHost):
+        def move(self, object_id: str, world_from_local: Any) -> None:
+            super().move(object_id, world_from_local)
+            _, scene = self._states.pop()  # into the step before it
+            self._at -= 1
+            self._states[self._at] = (self._states[self._at][0], scene)
+
+
+class TestForgetsOldSteps(Mutant, OnMemory):
+    breaks = "H29"
+
+    class Host(MemoryHost):
+        @contextmanager
+        def step(self, label: str) -> Iterator[None]:
+            with super().step(label):
+                yield
+            if self._depth == 0 and len(self._states) > 5:
+                del self._states[0]
+                self._at -= 1
+
+
+class TestSelectsTheNeighbour(Mutant, OnMemory):
+    breaks = "H30"
+
+    class Host(MemoryHost):
+        def selected_points(self, object_id: str, selection: str) -> SurfacePoints:
+            asset = self.read_surface(object_id)
+            super().selected_points(object_id, selection)
+            chosen = self.scene.objects[object_id].selections[selection] + 1
+            return SurfacePoints.at_vertices(asset.mesh, chosen)
+
+
+class TestDrawsIntoTheScene(Mutant, OnMemory):
+    breaks = "H31"
+    consequences = ("H32",)
+
+    class Host(MemoryHost):
+        def show(self, picture: Any) -> None:
+            super().show(picture)
+            if picture is not None:
+                self.add_polygons("overlay", picture.meshes[0].mesh.points, [3], [0, 1, 2])
+
+
+class TestCountsPixelsFromTheBottom(Mutant, OnMemory):
+    breaks = "H32"
+
+    class Host(MemoryHost):
+        def rays(self, pixels: Any) -> Any:
+            return super().rays(np.asarray(pixels, float) * [1, -1] + [0, self.viewport[1]])
+
+
+class TestNeverAnswersProgress(Mutant, OnMemory):
+    breaks = "H33"
+
+    class Host(MemoryHost):
+        def progress(self, fraction: float, text: str) -> Any:
+            super().progress(fraction, text)
+
+
+class TestWritesWithoutUnits(Mutant, OnMemory):
+    breaks = "H34"
+
+    class Host(MemoryHost):
+        def add(self, asset: Asset, world_from_surface: Any = None) -> str:
+            return super().add(replace(asset, meters_per_unit=None), world_from_surface)
