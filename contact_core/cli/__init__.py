@@ -18,9 +18,13 @@ from contact_core.plugins.registry import CLI, resolve
 from contact_core.plugins.slots import CliCommand
 
 _OWN = (
+    "contact_core.cli.pose:Pose",
     "contact_core.cli.samples:Samples",
+    "contact_core.cli.edits:History",
+    "contact_core.cli.edits:Replay",
     "contact_core.cli.plugins:Plugins",
     "contact_core.cli.new_plugin:NewPlugin",
+    "contact_core.cli.warm_up:WarmUp",
 )
 
 

@@ -28,6 +28,7 @@ def _data(record: PluginRecord) -> dict[str, Any]:
         "source": record.source,
         "origin": record.origin,
         "offers": record.offers,
+        "absent": record.absent,
         "problems": record.problems,
     }
 
@@ -35,5 +36,6 @@ def _data(record: PluginRecord) -> dict[str, Any]:
 def _text(record: PluginRecord) -> str:
     lines = [f"{record.name}  ({record.source}, {record.origin})"]
     lines += [f"    {noun}: {', '.join(names)}" for noun, names in record.offers.items()]
+    lines += [f"    - {sentence}" for sentence in record.absent]
     lines += [f"    ! {problem}" for problem in record.problems]
     return "\n".join(lines)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import pluggy
 
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, MissingExtra
 from contact_core.plugins import hookspecs
 from contact_core.plugins.checks import api_refusal, hook_mistakes, is_wrapper
 from contact_core.plugins.discovery import Candidate, Origin, discovered
@@ -27,7 +27,8 @@ T = TypeVar("T")
 class PluginRecord:
     """What is known of one plugin. source: distribution and version, or where else it came from.
 
-    problems: sentences, empty when all is well.  offers: noun of a slot -> names, filled as slots are asked for.
+    problems: sentences, empty when all is well.  absent: sentences on what a library that is not installed would
+    bring; that is no problem.  offers: noun of a slot -> names, filled as slots are asked for.
     """
 
     name: str
@@ -36,6 +37,7 @@ class PluginRecord:
     plugin: object | None = None  # None: it could not be used at all
     replaces: tuple[str, ...] = ()
     problems: list[str] = field(default_factory=list)
+    absent: list[str] = field(default_factory=list)
     offers: dict[str, list[str]] = field(default_factory=dict)
     collected: dict[str, list[Any]] = field(default_factory=dict, repr=False)  # hook -> sound objects
 
@@ -200,6 +202,9 @@ class PluginManager:
             try:
                 made = _made(offered, slot)
                 lacks = shortcomings(made, slot)
+            except MissingExtra as error:
+                record.absent.append(f"{slot.noun} {_reference(offered)}: {error}")
+                continue
             except (Exception, SystemExit) as error:
                 record.complain(f"its {slot.noun} {_reference(offered)} cannot be made: {_spell(error)}.")
                 continue

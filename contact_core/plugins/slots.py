@@ -97,7 +97,8 @@ class PlacementRequest:
     """What a placer gets: a posed manipulator, an object, and the patches to place.
 
     object_from_rig: (4, 4) takes rig space to object surface space. patch_points, patch_axes: per patch name,
-    on the manipulator's surface. options: the recipe's own settings for this placer.
+    on the manipulator's surface. options: the recipe's own settings for this placer. solids: closed surfaces in the
+    object's space whose inside is out of bounds too, such as the filled body of a cup.
     """
 
     rig: Rig
@@ -107,6 +108,7 @@ class PlacementRequest:
     patch_points: Mapping[str, SurfacePoints]
     patch_axes: Mapping[str, SurfacePoints]
     options: Mapping[str, Any] = field(default_factory=dict)
+    solids: tuple[TriangleMesh, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

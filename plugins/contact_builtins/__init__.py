@@ -24,8 +24,10 @@ def contact_brushes() -> list[object]:
 @hookimpl
 def contact_axis_generators() -> list[object]:
     return [
+        "contact_builtins.axes.consistent:Consistent",  # the first is what a session takes by default
         "contact_builtins.axes.along_bone:AlongBone",
         "contact_builtins.axes.principal:Principal",
+        "contact_builtins.axes.medial_axis:MedialAxis",
         "contact_builtins.axes.farthest_pair:FarthestPair",
     ]
 
@@ -108,9 +110,11 @@ def contact_samples() -> list[object]:
 
 @hookimpl
 def contact_commands() -> list[object]:
-    return []
+    from contact_core.edit import commands  # values and numpy only, and all of them load together
+
+    return [getattr(commands, name) for name in commands.__all__]
 
 
 @hookimpl
 def contact_cli() -> list[object]:
-    return []
+    return ["contact_builtins.cli.inspect:Inspect"]

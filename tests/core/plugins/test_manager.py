@@ -114,6 +114,15 @@ def test_a_broken_distribution_is_named_and_stops_nobody(install: Any, name: str
     assert not record_of(manager, "zz_sound").problems
 
 
+def test_a_missing_optional_library_is_no_problem(install: Any) -> None:
+    source = "from contact_core.errors import MissingExtra\ndef Mine(): raise MissingExtra('Magic', 'viewer')\n"
+    install("poor", OFFER + "@hookimpl\ndef contact_placers(): return ['poor_part:Mine', Mine]\n")
+    install("poor_part", source.replace("def Mine(): ", ""))
+    record = record_of(PluginManager(environ={"CONTACT_PLUGINS": "no:poor_part"}), "poor")
+    assert not record.problems and record.offers == {"placer": ["mine"]}
+    assert 'pip install "contact-core[viewer]"' in record.absent[0]
+
+
 def test_what_a_generator_gave_before_it_raised_stays() -> None:
     def contact_placers() -> Iterator[object]:
         yield Named("early")

@@ -1,0 +1,1 @@
+"""Sub-commands of `contact` that the built-ins bring."""
