@@ -18,7 +18,7 @@ from contact_core.pose.rotations import exponential, nearest_rotation
 
 
 def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:
-    """The pose with some dofs set, by name ("index_1.x", see `Chart.dof_names`): offsets from rest, radians or units.
+    """The pose with some dofs set by name (as in `Chart.dof_names`): offsets from rest, radians or units.
 
     Raises InvalidInput for an unknown name, a number that is not finite, and a value beyond its limit.
     """

@@ -118,7 +118,7 @@ def deepest(problem: PoseProblem, theta: np.ndarray) -> float:
 def test_penetration_keeps_skin_out() -> None:
     problem = pressed_into_ball()
     depths = []
-    for extra in ((), (PenetrationTerm(weight=200.0, resolution=32),)):
+    for extra in ((), (PenetrationTerm(weight=20.0, resolution=32),)):
         posed = replace(problem, terms=(*paper_terms(), *extra))
         depths.append(deepest(posed, LevenbergMarquardt().solve(posed).theta))
     assert depths[1] < 0.5 * depths[0], depths

@@ -1,4 +1,4 @@
-"""Penetration: skin inside a solid costs the square of its depth, averaged over the skin's area."""
+"""Penetration: skin inside a solid costs the square of its depth, by area."""
 
 from __future__ import annotations
 
@@ -21,10 +21,15 @@ if TYPE_CHECKING:
     from contact_core.pose.problem import PoseProblem
 
 
+REFERENCE_AREA = 10.0  # in l^2
+
+
 @dataclass(frozen=True, eq=False)
 class PenetrationTerm:
-    """sum a_v max(0, -s_v / l)^2 / sum a_v over skin vertices v, s the signed distance to the nearest solid.
+    """sum a_v max(0, -s_v / l)^2 / (10 l^2) over skin vertices v, s the signed distance to the nearest solid.
 
+    Ten l^2 are ten finger pads: skin of that area one l deep costs as much as all contacts one l apart,
+    whatever else of the body's skin is in the air.
     solids: closed meshes per body, in the body's surface space; by default each rigid body's own surface. Give
     a filled proxy where walls are thin: depth in a cup's wall says nothing about a finger inside the cup.
     skins: which bodies' skin is looked at; by default every skinned one. samples: how many vertices stand for
@@ -76,10 +81,9 @@ class _Penetration:
             wanted = len(body.rig.joints) > 1 if term.skins is None else body.name in term.skins
             if wanted and (len(problem.free_of_body[index]) or any(s.movable for s in self.solids.values())):
                 vertices, areas = thinned(body.rig.surface, term.samples)
+                areas = areas * (uniform_scale(body.world_from_rig) / self.unit) ** 2  # in l^2
                 track = vertex_track(body.rig, vertices, int(problem.bone_offsets[index]))
-                self.skins.append((body.name, track, areas))
-        total = sum(float(areas.sum()) for _, _, areas in self.skins) or 1.0
-        self.skins = [(name, track, term.weight * areas / total) for name, track, areas in self.skins]
+                self.skins.append((body.name, track, term.weight / REFERENCE_AREA * areas))
 
     def value(self, state: PoseState) -> float:
         return sum(float(w[t.rows] @ (t.depth / self.unit) ** 2) for _, w, _, t in self._touches(state))
