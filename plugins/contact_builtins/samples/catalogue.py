@@ -59,6 +59,25 @@ def sample(name: str) -> GeneratedSample:
 HUMAN_HAND = GeneratedSample(
     "human_hand", "manipulator", "a right human hand, 18 cm, 25 joints, open and relaxed", "human_hand:build"
 )
+WITCH_HAND = GeneratedSample(
+    "witch_hand",
+    "manipulator",
+    "a witch's right hand with long knobbly fingers and claws, 25 joints",
+    "witch_hand:build",
+)
+ALIEN_HAND = GeneratedSample(
+    "alien_hand", "manipulator", "a three-fingered alien hand with bulbous pads, 14 joints", "alien_hand:build"
+)
+TENTACLE = GeneratedSample(
+    "tentacle", "manipulator", "a tentacle of 21 joints, tapered, its inner side flat", "tentacle:build"
+)
+HUMAN_BODY = GeneratedSample(
+    "human_body", "manipulator", "a full body, 1.76 m, 26 joints, that can sit", "human_body:build"
+)
 MUG = GeneratedSample("mug", "object", "a mug with a handle (genus 1)", "mug:build")
 BASEBALL = GeneratedSample("baseball", "object", "a baseball with its seam", "baseball:build")
-ALL = (HUMAN_HAND, MUG, BASEBALL)
+SCISSORS = GeneratedSample("scissors", "object", "closed scissors (genus 2)", "scissors:build")
+POLE = GeneratedSample("pole", "object", "an upright pole, 1.2 m", "furniture:pole")
+CHAIR = GeneratedSample("chair", "object", "a wooden chair, seat at 45 cm", "furniture:chair")
+FLOOR = GeneratedSample("floor", "object", "a floor of 3 m by 3 m", "furniture:floor")
+ALL = (HUMAN_HAND, WITCH_HAND, ALIEN_HAND, TENTACLE, HUMAN_BODY, MUG, BASEBALL, SCISSORS, POLE, CHAIR, FLOOR)

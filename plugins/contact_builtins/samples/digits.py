@@ -8,12 +8,17 @@ from itertools import pairwise
 
 import numpy as np
 
+from contact_builtins.samples.binding import bone_heat_weights, strongest
 from contact_builtins.samples.fields import Field, ball, chain, common, ellipsoid, half_space, union, without
-from contact_builtins.samples.skeleton import Bone, bone_frame, fixed, limits
+from contact_builtins.samples.modelling import Sizing
+from contact_builtins.samples.skeleton import Bone, bone_frame, fixed, limits, rig_of, root
 from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.pose.rig import Rig
 
 MM = 1e-3
 Triple = tuple[float, float, float]
+Segment = tuple[str, FloatArray, FloatArray, float]  # bone, its two ends, how thick the flesh on it is
 
 # Degrees of the joints, by segment: twist, spread, flexion from and to.
 FINGER_PARTS = ("metacarpal", "proximal", "intermediate", "distal", "tip")
@@ -107,11 +112,11 @@ def _nail_bed(d: Digit, size: float) -> Field:
 
 
 def heat_sources(
-    points: FloatArray, bones: Sequence[Bone], segments: Sequence[tuple[str, FloatArray, FloatArray, float]]
+    points: FloatArray, bones: Sequence[Bone], segments: Sequence[Segment]
 ) -> tuple[IntArray, FloatArray]:
     """The bone that warms each point, and its distance.
 
-    segments: name of a bone, its two ends, and how thick the flesh on it is. The bone with the nearest flesh wins.
+    The bone with the nearest flesh wins.
     Returns (n,) indices into bones, and (n,) distances to the bone's segment.
     """
     from_bone = np.empty((len(points), len(segments)))
@@ -124,7 +129,7 @@ def heat_sources(
     return owner, from_bone[np.arange(len(points)), nearest]
 
 
-def digit_segments(d: Digit, palm_radius: float) -> list[tuple[str, FloatArray, FloatArray, float]]:
+def digit_segments(d: Digit, palm_radius: float) -> list[Segment]:
     """The segments of a digit's bones for `heat_sources`; the tip belongs to the last bone."""
     thick = np.concatenate([[palm_radius], d.radii])
     reach = d.joints.copy()
@@ -133,3 +138,26 @@ def digit_segments(d: Digit, palm_radius: float) -> list[tuple[str, FloatArray, 
         (f"{d.name}_{part}", reach[k], reach[k + 1], 0.5 * (thick[k] + thick[k + 1]))
         for k, part in enumerate(d.parts[:-1])
     ]
+
+
+def hand_rig(name: str, mesh: TriangleMesh, digits: Sequence[Digit], wrist: Segment, palm_radius: float) -> Rig:
+    """A rig with a free wrist and `digits` on it, its skin bound by bone heat. wrist: the palm's own segment."""
+    bones = [Bone("wrist", "", [0, 0, 0], [0, 1, 0], [0, 0, 1], root())]
+    segments = [wrist]
+    for d in digits:
+        bones += d.bones("wrist")
+        segments += digit_segments(d, palm_radius)
+    weights = bone_heat_weights(mesh, *heat_sources(mesh.points, bones, segments), len(bones))
+    return rig_of(name, bones, mesh, *strongest(weights, 4))
+
+
+def finer_at_tips(digits: Sequence[Digit], lengths: tuple[float, float, float]) -> Sizing:
+    """Edge lengths that grow from the fingertips over the palm to the wrist."""
+    tips = np.array([d.joints[-1] for d in digits])  # (d, 3)
+    longest = max(float(np.linalg.norm(d.joints[-1])) for d in digits)
+
+    def sizing(points: FloatArray) -> FloatArray:
+        away = np.linalg.norm(points[:, None, :] - tips, axis=2).min(axis=1)
+        return np.interp(away, [0.06 * longest, 0.35 * longest, 0.8 * longest], lengths)
+
+    return sizing

@@ -10,12 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from contact_builtins.samples.binding import bone_heat_weights, strongest
-from contact_builtins.samples.digits import MM, Digit, digit, digit_flesh, digit_segments, heat_sources
+from contact_builtins.samples.digits import MM, Digit, digit, digit_flesh, finer_at_tips, hand_rig
 from contact_builtins.samples.fields import Field, ball, chain, common, half_space, round_cone, slab, union
 from contact_builtins.samples.modelling import surface_of
-from contact_builtins.samples.skeleton import Bone, rig_of, root
-from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 
 # Half thickness at knuckle, middle joint, last joint and tip, in millimetres.
@@ -41,23 +38,11 @@ DIGITS = (THUMB, *FINGERS)
 def build() -> Asset:
     """The hand as a rig of 25 joints, named as in WebXR and OpenXR."""
     flesh = union([palm_flesh(), union([digit_flesh(d) for d in DIGITS], 1.5 * MM)], 6 * MM)
-    mesh = surface_of(flesh, np.array([-75, -30, -32]) * MM, np.array([92, 195, 60]) * MM, 3.0 * MM, edge_length)
-    bones = [Bone("wrist", "", [0, 0, 0], [0, 1, 0], [0, 0, 1], root())]
-    for d in DIGITS:
-        bones += d.bones("wrist")
-    segments = [("wrist", np.array([0, -40, 0]) * MM, np.array([0, 14, 0]) * MM, 17 * MM)]
-    for d in DIGITS:
-        segments += digit_segments(d, 12 * MM)
-    weights = bone_heat_weights(mesh, *heat_sources(mesh.points, bones, segments), len(bones))
-    rig = rig_of("human_hand", bones, mesh, *strongest(weights, 4))
-    return Asset(name="human_hand", mesh=rig.surface, rig=rig, meters_per_unit=1.0, up_axis="Y")
-
-
-def edge_length(points: FloatArray) -> FloatArray:
-    """Wanted edge lengths (n,): fine at the fingertips, coarse at the wrist."""
-    tips = np.array([d.joints[-1] for d in DIGITS])  # (5, 3)
-    away = np.linalg.norm(points[:, None, :] - tips, axis=2).min(axis=1)
-    return np.interp(away, [10 * MM, 60 * MM, 140 * MM], [2.5 * MM, 3.6 * MM, 4.8 * MM])
+    sizing = finer_at_tips(DIGITS, (2.5 * MM, 3.6 * MM, 4.8 * MM))
+    mesh = surface_of(flesh, np.array([-75, -30, -32]) * MM, np.array([92, 195, 60]) * MM, 3.0 * MM, sizing)
+    wrist = ("wrist", np.array([0, -40, 0]) * MM, np.array([0, 14, 0]) * MM, 17 * MM)
+    rig = hand_rig("human_hand", mesh, DIGITS, wrist, 12 * MM)
+    return Asset(name=rig.name, mesh=rig.surface, rig=rig, meters_per_unit=1.0, up_axis="Y")
 
 
 def palm_flesh() -> Field:
