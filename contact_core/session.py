@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -22,10 +22,11 @@ from contact_core.edit.journal import Journal
 from contact_core.edit.recovery import journal_path, open_file, write_document
 from contact_core.edit.stroke import Stroke
 from contact_core.edit.verbs import Verbs
+from contact_core.edit.verbs.rebinding import RebindReport, plan_rebind
 from contact_core.errors import CommandRejected, FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Rig
+from contact_core.pose.rig import Rig, forward_kinematics, skin
 
 if TYPE_CHECKING:
     from contact_core.host_link import HostLink
@@ -70,12 +71,12 @@ class Session(Verbs):
         discover: bool = True,
     ) -> None:
         self.history = History(document or ContactDocument())
-        self.meshes: dict[str, TriangleMesh] = {}
+        self._meshes: dict[str, TriangleMesh] = {}  # by digest
         self.rigs: dict[str, Rig] = {}
         self.notes: tuple[str, ...] = ()
         self.path: Path | None = None
         self.read_only = False
-        self._derived = Derived(self.meshes)
+        self._derived = Derived(self._meshes)
         self._listeners: list[Listener] = []
         self._journal: Journal | None = None
         self._lock: DocumentLock | None = None
@@ -200,12 +201,52 @@ class Session(Verbs):
         if known is None:
             self.do(AddSurface(wanted), origin="asset")
         elif known.digest != wanted.digest:
-            moved = Surface(**{**_fields(known), "digest": wanted.digest})
+            moved = replace(known, digest=wanted.digest)
             self.do(RebindSurface(moved, self.document.shapes.without(*self.document.shapes), ()), origin="asset")
-        self.meshes[name] = mesh
+        self._meshes[mesh.digest] = mesh
         if rig is not None:
             self.rigs[name] = rig
         return self.document.surface(name)
+
+    def rebind(self, name: str, mesh: TriangleMesh, *, old_mesh: TriangleMesh | None = None) -> RebindReport:
+        """Put the contacts of a surface onto another mesh under the same name, and say how far they moved.
+
+        The old mesh has to be known: added to this session before, or given. Undo goes back to it.
+        """
+        known = self.document.surface(name)
+        if old_mesh is not None:
+            if old_mesh.digest != known.digest:
+                raise InvalidInput(f"the old mesh of {name!r} is not the one that its contacts were painted on.")
+            self._meshes[old_mesh.digest] = old_mesh
+        changed = replace(
+            known,
+            digest=mesh.digest,
+            topology_digest=mesh.topology_digest,
+            points=len(mesh.points),
+            faces=len(mesh.faces),
+        )
+        command, report = plan_rebind(self, changed, mesh)
+        self._meshes[mesh.digest] = mesh
+        self.do(command)
+        return report
+
+    def posed_mesh(self, surface: str) -> TriangleMesh:
+        """The surface in the pose that the document holds; at rest without one."""
+        pose, rig = self.document.poses.get(surface), self.rigs.get(surface)
+        if pose is None:
+            return self.mesh(surface)
+        if rig is None:
+            raise InvalidInput(f"the rig of {surface!r} is not loaded: give it to the session by add_surface.")
+        local = rig.rest_local.copy()
+        for joint, matrix in zip(pose.joints, pose.local, strict=True):
+            local[rig.joint_index(joint)] = matrix
+        return self.mesh(surface).with_points(skin(rig, forward_kinematics(rig.parents, local)))
+
+    @property
+    def meshes(self) -> dict[str, TriangleMesh]:
+        """The meshes that the session was given, by the names of their surfaces in the document as it is now."""
+        surfaces = self.document.surfaces.values()
+        return {s.name: self._meshes[s.digest] for s in surfaces if s.digest in self._meshes}
 
     # -- commands ------------------------------------------------------------------------------------------------
 
@@ -406,7 +447,3 @@ class Session(Verbs):
             self._plugins.notify(
                 "contact_document_changed", document=change.after, revision=change.revision, origin=change.origin
             )
-
-
-def _fields(surface: Surface) -> Mapping[str, Any]:
-    return {name: getattr(surface, name) for name in surface.__dataclass_fields__}

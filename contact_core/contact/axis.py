@@ -109,7 +109,7 @@ def reconstruct_axis(
         return Axis(root.point(), np.array([root.heading]), np.zeros(1))
     turns = -shape.turning_angles if mirrored else shape.turning_angles  # (m - 2,)
     chains = _prefix_chains(shape.lengths * (shape.along * unit), turns)
-    starts = SurfacePoints(np.full(m - 1, root.face), np.tile(root.barycentric, (m - 1, 1)))
+    starts = root.point()[np.zeros(m - 1, np.int64)]
     trace = trace_chains(mesh, starts, chains.first * root.heading, chains.offsets, chains.turns, chains.lengths)
     tangents = np.concatenate([[root.heading], trace.headings])  # (m,)
     tangents[1:-1] *= np.exp(1j * turns)
@@ -186,6 +186,7 @@ def _prefix_chains(lengths: FloatArray, turns: FloatArray) -> Chains:
     offsets = np.concatenate([[0], np.cumsum(run)])
     first = np.where(run == 0, partial, whole[0] if len(whole) else 0.0)
     bend = turns[knots[1:] - 1]
-    chain_turns = np.concatenate([bend[:r] for r in run]) if len(run) else np.zeros(0)
-    chain_lengths = np.concatenate([np.append(whole[1:r], p) if r else whole[:0] for r, p in zip(run, partial)])  # noqa: B905
-    return Chains(first, offsets, chain_turns, chain_lengths)
+    step = np.arange(offsets[-1]) - np.repeat(offsets[:-1], run)  # how many bends a leg comes after the first
+    chain_lengths = whole[np.minimum(step + 1, len(whole) - 1)] if len(whole) else whole
+    chain_lengths[offsets[1:][run > 0] - 1] = partial[run > 0]
+    return Chains(first, offsets, bend[step], chain_lengths)

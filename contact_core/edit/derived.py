@@ -29,15 +29,15 @@ class Derived:
     """
 
     def __init__(self, meshes: Mapping[str, TriangleMesh]) -> None:
-        self._meshes = meshes
+        self._meshes = meshes  # by content digest: after a rebind, undo finds the old mesh again
         self._kept: OrderedDict[Hashable, tuple[object, int]] = OrderedDict()
         self._points = 0
         self.computed = 0
 
-    def mesh(self, surface: str) -> TriangleMesh:
-        """The mesh behind a surface's name. Raises InvalidInput where the session was not given it."""
+    def mesh(self, document: ContactDocument, surface: str) -> TriangleMesh:
+        """The mesh of a surface. Raises InvalidInput where the session was not given it."""
         try:
-            return self._meshes[surface]
+            return self._meshes[document.surface(surface).digest]
         except KeyError:
             raise InvalidInput(
                 f"the mesh of {surface!r} is not loaded: give it to the session by add_surface({surface!r}, mesh)."
@@ -65,7 +65,7 @@ class Derived:
         def trace() -> Axis:
             self.computed += 1
             return reconstruct_axis(
-                self.mesh(patch.surface),
+                self.mesh(document, patch.surface),
                 shape,
                 self.root(document, name),
                 mirrored=patch.mirrored,
@@ -83,7 +83,7 @@ class Derived:
             axis = self.axis(document, name)
             self.computed += 1
             return points_from_axis(
-                self.mesh(patch.surface),
+                self.mesh(document, patch.surface),
                 coordinates,
                 axis,
                 document.effective_axis(name),
@@ -95,7 +95,7 @@ class Derived:
 
     def _linked_root(self, document: ContactDocument, name: str, link: Link) -> Root:
         patch = document.patch(name)
-        mesh = self.mesh(patch.surface)
+        mesh = self.mesh(document, patch.surface)
         point, tangent, _ = follow_link(mesh, self.axis(document, link.parent), link)
         return root_from_point(
             mesh,

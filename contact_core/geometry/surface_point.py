@@ -48,7 +48,7 @@ class SurfacePoints:
     def __getitem__(self, index: Any) -> SurfacePoints:
         """A sub-batch; an integer gives a batch of one."""
         faces, barycentric = self.faces[index], self.barycentric[index]
-        return SurfacePoints(np.atleast_1d(faces), np.atleast_2d(barycentric))
+        return SurfacePoints.trusted(np.atleast_1d(faces), np.atleast_2d(barycentric))
 
     def __repr__(self) -> str:
         return f"SurfacePoints({len(self)} points)"
@@ -83,7 +83,9 @@ class SurfacePoints:
         batches = list(batches)
         if not batches:
             return cls(np.zeros(0, np.int64), np.zeros((0, 3)))
-        return cls(np.concatenate([b.faces for b in batches]), np.concatenate([b.barycentric for b in batches]))
+        return cls.trusted(
+            np.concatenate([b.faces for b in batches]), np.concatenate([b.barycentric for b in batches])
+        )
 
     @classmethod
     def at_vertices(cls, mesh: TriangleMesh, vertices: Any) -> SurfacePoints:

@@ -1,12 +1,13 @@
 """The artist's verbs: each finds out, with the meshes, what a command has to hold, and submits that command."""
 
 from contact_core.edit.verbs.editor import Editor
+from contact_core.edit.verbs.gathering import GatheringVerbs
 from contact_core.edit.verbs.organising import OrganisingVerbs
-from contact_core.edit.verbs.painting import PaintingVerbs
 from contact_core.edit.verbs.placing import PlacingVerbs
+from contact_core.edit.verbs.sets import SetVerbs
 
 
-class Verbs(PaintingVerbs, PlacingVerbs, OrganisingVerbs):
+class Verbs(GatheringVerbs, PlacingVerbs, OrganisingVerbs, SetVerbs):
     """All verbs. A session commits what they submit, a stroke previews it."""
 
 

@@ -39,12 +39,11 @@ class Editor(ABC):
 
     def mesh(self, surface: str) -> TriangleMesh:
         """The mesh of a surface. Raises InvalidInput when the session was not given it."""
-        self.document.surface(surface)
-        return self.derived.mesh(surface)
+        return self.derived.mesh(self.document, surface)
 
     def mesh_of(self, patch: str) -> TriangleMesh:
         """The mesh that a patch lies on."""
-        return self.derived.mesh(self.document.patch(patch).surface)
+        return self.mesh(self.document.patch(patch).surface)
 
     def axis(self, patch: str) -> Axis:
         """The axis of a patch where it is now."""

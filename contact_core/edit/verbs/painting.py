@@ -66,10 +66,26 @@ class PaintingVerbs(Editor):
         if surface is None:
             raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")
         picks = axis if axis is not None else self.default_axis(surface, patch, points, generator)
+        return self.submit(self.painting(patch, surface, points, picks, heading, dense, strength, color))
+
+    def painting(
+        self,
+        patch: str,
+        surface: str,
+        points: SurfacePoints,
+        picks: SurfacePoints,
+        heading: complex | None = None,
+        dense: bool = True,
+        strength: Any = None,
+        color: Color | None = None,
+        *,
+        number: int = 0,
+    ) -> Paint:
+        """The command that paints a new patch; `number` counts those painted with it."""
         shape, placed = self._shape(surface, points, picks, heading, dense, strength)
-        color = color or PALETTE[len(self.document.patches) % len(PALETTE)]
+        color = color or PALETTE[(len(self.document.patches) + number) % len(PALETTE)]
         key = self.document.free_name(patch, self.document.shapes)
-        return self.submit(Paint(Patch(patch, surface, key, placed.root(), color=color), shape))
+        return Paint(Patch(patch, surface, key, placed.root(), color=color), shape)
 
     def paint_region(
         self, name: str, points: Mapping[str, SurfacePoints], *, axes: Mapping[str, SurfacePoints] | None = None
@@ -91,10 +107,7 @@ class PaintingVerbs(Editor):
             picks = (axes or {}).get(surface)
             if picks is None:
                 picks = self.default_axis(surface, patch, part, None)
-            shape, placed = self._shape(surface, part, picks, None, True, None)
-            color = PALETTE[len(self.document.patches) % len(PALETTE)]
-            key = self.document.free_name(patch, self.document.shapes)
-            commands.append(Paint(Patch(patch, surface, key, placed.root(), color=color), shape))
+            commands.append(self.painting(patch, surface, part, picks, number=len(names)))
             names.append(patch)
         if len(parts) > 1:
             commands.append(Group(name, tuple(names)))

@@ -266,6 +266,6 @@ def test_a_newer_journal_is_refused_and_left_untouched(tmp_path: Path) -> None:
     path = tmp_path / "document.json"
     header = encode_line({"journal": "contact-core.journal", "version": 99, "revision": 0, "document": {}})
     journal_path(path).write_bytes(header)
-    with pytest.raises(FileRefused, match="version 99.*newer contact-core"):
+    with pytest.raises(FileRefused, match=r"version 99.*newer contact-core"):
         open_file(path)
     assert journal_path(path).read_bytes() == header

@@ -1,0 +1,114 @@
+"""Verbs that save contact sets and load them onto the same or another manipulator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from contact_core.contact.placement import Link, Root
+from contact_core.document.document import Patch
+from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.library import ContactSet, load_contact_set, save_contact_set
+from contact_core.edit.commands import Import
+from contact_core.edit.verbs.editor import Editor
+from contact_core.errors import InvalidInput
+
+
+class SetVerbs(Editor):
+    """Export and import."""
+
+    def contact_set(self, title: str, patches: Iterable[str] | None = None) -> ContactSet:
+        """Patches, all by default, as a set that is complete in itself.
+
+        A patch whose parent is left out gets the root where it is now; pairs and groups come along where all their
+        patches do.
+        """
+        document = self.document
+        names = list(document.patches if patches is None else patches)
+        chosen: dict[str, Patch] = {}
+        owned: set[str] = set()
+        for name in names:
+            patch = document.patch(name)
+            if isinstance(patch.placement, Link) and patch.placement.parent not in names:
+                patch = replace(patch, placement=self.root(name))
+            chosen[name] = patch
+            owned |= {patch.shape} if patch.original else set()
+        for name, patch in chosen.items():  # where the original stays behind, the first copy takes its part
+            if patch.shape not in owned:
+                owned.add(patch.shape)
+                chosen[name] = replace(patch, original=True)
+        surfaces = {patch.surface for patch in chosen.values()}
+        return ContactSet(
+            title,
+            FrozenMap({name: document.surface(name) for name in document.surfaces if name in surfaces}),
+            FrozenMap(chosen),
+            FrozenMap({patch.shape: document.shapes[patch.shape] for patch in chosen.values()}),
+            FrozenMap({n: p for n, p in document.pairs.items() if {p.manipulator, p.object} <= set(chosen)}),
+            FrozenMap({n: members for n, members in document.groups.items() if set(members) <= set(chosen)}),
+        )
+
+    def export_set(self, path: Path | str, title: str, patches: Iterable[str] | None = None) -> ContactSet:
+        """Save patches, all by default, with their links, pairs and groups. Raises FileRefused."""
+        found = self.contact_set(title, patches)
+        save_contact_set(found, path)
+        return found
+
+    def import_set(
+        self,
+        source: ContactSet | Path | str,
+        *,
+        onto: Mapping[str, str] | None = None,
+        roots: Mapping[str, Root] | None = None,
+    ) -> dict[str, str]:
+        """Load a set; answers the new names by the names in the set. Names that are taken get a number.
+
+        onto: by surface of the set, the surface to load onto (the same name by default). Where that has the same
+        topology, everything goes where it was. On another surface each patch that hangs on no other needs an
+        entry in `roots`, and what hangs on it follows by its links. Raises InvalidInput naming what is missing.
+        """
+        loaded = source if isinstance(source, ContactSet) else load_contact_set(source)
+        names, keys = self._fresh_names(loaded)
+        patches, missing = [], []
+        for patch in loaded.parents_first():
+            old = loaded.surfaces[patch.surface]
+            new = self.document.surface((onto or {}).get(old.name, old.name))
+            placement = patch.placement
+            if isinstance(placement, Link):
+                units = old.meters_per_unit / new.meters_per_unit
+                placement = replace(placement.scaled(units), parent=names[placement.parent])
+            elif roots is not None and patch.name in roots:
+                placement = roots[patch.name]
+            elif new.topology_digest != old.topology_digest:
+                missing.append(patch.name)
+            name, key = names[patch.name], keys[patch.shape]
+            patches.append(replace(patch, name=name, surface=new.name, shape=key, placement=placement))
+        if missing:
+            raise InvalidInput(
+                f"the set {loaded.title!r} was painted on another mesh: give roots for {', '.join(missing)}."
+            )
+        taken = set(self.document.pairs)
+        pairs = []
+        for pair in loaded.pairs.values():
+            name = self.document.free_name(pair.name, dict.fromkeys(taken))
+            taken.add(name)
+            pairs.append(replace(pair, name=name, manipulator=names[pair.manipulator], object=names[pair.object]))
+        groups = {
+            self.document.free_name(name, self.document.groups): tuple(names[member] for member in members)
+            for name, members in loaded.groups.items()
+        }
+        shapes = {keys[key]: shape for key, shape in loaded.shapes.items()}
+        self.submit(Import(tuple(patches), FrozenMap(shapes), tuple(pairs), FrozenMap(groups), loaded.title))
+        return names
+
+    def _fresh_names(self, loaded: ContactSet) -> tuple[dict[str, str], dict[str, str]]:
+        """Names for patches and keys for shapes that the document does not use yet."""
+        taken, names = dict.fromkeys(self.document.patches), {}
+        for name in loaded.patches:
+            names[name] = self.document.free_name(name, taken)
+            taken[names[name]] = None
+        taken, keys = dict.fromkeys(self.document.shapes), {}
+        for key in loaded.shapes:
+            keys[key] = self.document.free_name(key, taken)
+            taken[keys[key]] = None
+        return names, keys
