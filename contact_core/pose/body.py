@@ -10,6 +10,7 @@ from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.black_box import BlackBox
 from contact_core.pose.rig import JointFreedom, Pose, Rig
 
 
@@ -18,13 +19,15 @@ class Body:
     """One thing of a pose problem and where it stands.
 
     pose: where the solve starts. world_from_rig: (4, 4) places rig space in the problem's world (rigid or with
-    a uniform scale, so that surfaces of different units meet).
+    a uniform scale, so that surfaces of different units meet). black_box: evaluates the body in the rig's stead
+    (tier B); the rig then only holds its rest surface.
     """
 
     name: str
     rig: Rig
     pose: Pose
     world_from_rig: FloatArray = field(default_factory=lambda: np.eye(4))
+    black_box: BlackBox | None = None
 
     def __post_init__(self) -> None:
         placed = frozen(self.world_from_rig, np.float64, (4, 4), f"world_from_rig of {self.name}")
@@ -51,6 +54,17 @@ class Body:
         """A surface that stays where it is, or (`movable`) that the solve may move as a whole."""
         rig = rigid_rig(name, mesh, movable=movable)
         return cls(name, rig, Pose.rest(rig), np.eye(4) if world_from_surface is None else world_from_surface)
+
+    @classmethod
+    def evaluated(cls, name: str, black_box: BlackBox) -> Body:
+        """A body that something else evaluates, starting at rest."""
+        return cls(
+            name,
+            rigid_rig(name, black_box.surface, movable=False),
+            Pose((), np.zeros((0, 4, 4))),
+            np.eye(4),
+            black_box,
+        )
 
 
 def rigid_rig(name: str, mesh: TriangleMesh, *, movable: bool) -> Rig:

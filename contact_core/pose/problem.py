@@ -13,10 +13,11 @@ import numpy as np
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.black_box import BlackBoxChart, BlackBoxMotion
 from contact_core.pose.body import Body, PairedPoints, manipulator_length, uniform_scale
 from contact_core.pose.chart import Chart, Motion
 from contact_core.pose.rig import Pose
-from contact_core.pose.skinning import Track, normal_track, point_track
+from contact_core.pose.skinning import Track, normal_track, point_track, watched_track
 from contact_core.pose.state import PoseState
 from contact_core.pose.terms import BoundTerm, PoseTerm, paper_terms
 
@@ -89,9 +90,20 @@ class PoseProblem:
     # --- dofs ---------------------------------------------------------------------------------------------
 
     @cached_property
-    def charts(self) -> tuple[Chart, ...]:
+    def charts(self) -> tuple[Chart | BlackBoxChart, ...]:
         """One chart per body."""
-        return tuple(Chart(body.rig, body.world_from_rig) for body in self.bodies)
+        return tuple(
+            Chart(body.rig, body.world_from_rig)
+            if body.black_box is None
+            else BlackBoxChart(body.black_box, body.rig, self._points_on(body.name))
+            for body in self.bodies
+        )
+
+    def _points_on(self, body: str) -> SurfacePoints:
+        """All contact points on a body: first as manipulator, then as object, contact by contact."""
+        mine = [contact.manipulator_points for contact in self.contacts if contact.manipulator == body]
+        theirs = [contact.object_points for contact in self.contacts if contact.object == body]
+        return SurfacePoints.concatenate([*mine, *theirs])
 
     @cached_property
     def is_rigid(self) -> bool:
@@ -204,10 +216,15 @@ class PoseProblem:
         full[self.free_of_body[index]] = theta[self.dof_slices[index]]
         return full
 
+    def pose_names(self, index: int) -> tuple[str, ...]:
+        """What a pose of a body names: the joints of a rig, the dofs of a black box."""
+        body = self.bodies[index]
+        return body.rig.joints if body.black_box is None else self.charts[index].dof_names
+
     def poses(self, theta: FloatArray) -> dict[str, Pose]:
         """The pose of every body at theta (d,)."""
         return {
-            body.name: Pose(body.rig.joints, self.charts[i].local(self.full_theta(i, theta), self._leftovers[i]))
+            body.name: Pose(self.pose_names(i), self.charts[i].local(self.full_theta(i, theta), self._leftovers[i]))
             for i, body in enumerate(self.bodies)
         }
 
@@ -239,6 +256,8 @@ class PoseProblem:
             for index, body in enumerate(self.bodies)
             if len(self.free_of_body[index]) and len(body.rig.joints) > 1
         ]
+        lengths += [body.black_box.world_length for body in self.bodies if body.black_box is not None]
+        lengths = [length for length in lengths if length > 0.0]
         if not lengths:  # only rigid things move
             lengths = [
                 manipulator_length(body.rig) * uniform_scale(body.world_from_rig)
@@ -265,7 +284,12 @@ class PoseProblem:
     @cached_property
     def bone_offsets(self) -> IntArray:
         """(bodies + 1,) the first bone column of each body."""
-        return np.cumsum([0, *(len(body.rig.joints) for body in self.bodies)])
+        return np.cumsum([0, *(len(b.rig.joints) if b.black_box is None else 0 for b in self.bodies)])
+
+    @cached_property
+    def watched_offsets(self) -> IntArray:
+        """(bodies + 1,) the first watched contact point of each black box."""
+        return np.cumsum([0, *(c.watched if isinstance(c, BlackBoxChart) else 0 for c in self.charts)])
 
     @cached_property
     def moves(self) -> FloatArray:
@@ -288,12 +312,12 @@ class PoseProblem:
         rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(self.contacts)}
         manipulators = [(contact.manipulator, contact.manipulator_points) for contact in self.contacts]
         objects = [(contact.object, contact.object_points) for contact in self.contacts]
-        first, first_normals = self._tracks(manipulators)
-        second, second_normals = self._tracks(objects)
+        first, first_normals = self._tracks(manipulators, as_object=False)
+        second, second_normals = self._tracks(objects, as_object=True)
         gap = first.combined(second, -1.0)
         return Pairs(first, second, first_normals, second_normals, gap, weights / weights.sum(), rows)
 
-    def _tracks(self, ends: Sequence[tuple[str, SurfacePoints]]) -> tuple[Track, Track]:
+    def _tracks(self, ends: Sequence[tuple[str, SurfacePoints]], *, as_object: bool) -> tuple[Track, Track]:
         """Points and normals of one end of all pairs; what lies on one body is blended in one go."""
         owner = np.repeat([self.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
         points = SurfacePoints.concatenate([points for _, points in ends])
@@ -302,6 +326,13 @@ class PoseProblem:
             rows = np.flatnonzero(owner == index)
             rig, first = self.bodies[index].rig, int(self.bone_offsets[index])
             order.append(rows)
+            if self.bodies[index].black_box is not None:
+                total = int(self.watched_offsets[-1])
+                end = int(self.watched_offsets[index + 1])
+                start = end - len(rows) if as_object else int(self.watched_offsets[index])
+                tracks.append(watched_track(start, len(rows), total, 4))
+                normals.append(watched_track(start, len(rows), total, 3))
+                continue
             tracks.append(point_track(rig, points[rows], first))
             normals.append(normal_track(rig, points[rows], first))
         back = np.argsort(np.concatenate(order))
@@ -315,7 +346,7 @@ class PoseProblem:
         return {term.name: term.bind(self) for term in self.terms}
 
     @cached_property
-    def _still(self) -> dict[int, Motion]:
+    def _still(self) -> dict[int, Motion | BlackBoxMotion]:
         """Motions of the bodies that do not move."""
         return {
             i: chart.motion(self._charted[i][0], self._leftovers[i])
@@ -323,7 +354,7 @@ class PoseProblem:
             if not len(self.free_of_body[i])
         }
 
-    def motions(self, theta: FloatArray) -> tuple[Motion, ...]:
+    def motions(self, theta: FloatArray) -> tuple[Motion | BlackBoxMotion, ...]:
         """The motion of every body at theta (d,)."""
         return tuple(
             self._still[i] if i in self._still else chart.motion(self.full_theta(i, theta), self._leftovers[i])
@@ -352,7 +383,7 @@ class PoseProblem:
         return sum((term.normal_matrix(state) for term in self.bound_terms.values()), np.zeros((d, d)))
 
 
-def _named(chart: Chart, names: Iterable[str]) -> BoolArray:
+def _named(chart: Chart | BlackBoxChart, names: Iterable[str]) -> BoolArray:
     """(dofs,) those of the named joints, and single dofs by name."""
     result = np.zeros(chart.size, bool)
     for name in names:

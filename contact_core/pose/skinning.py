@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -24,15 +25,25 @@ from contact_core.pose.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)
+class Gram:
+    """What a weighted sum of squares needs of a track: sum_i w_i h_i h_i^T, or the weights where rows are watched."""
+
+    matrix: FloatArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Track:
     """k vectors that the bones carry: points (`width` 4) or normals (`width` 3), not normalised.
 
     bones: (b,) which bones of the problem (columns over all its bodies). matrix: (k, width * b).
+    watched: (k, m) sparse, what is added of the points or normals that black boxes evaluate; None: nothing.
     """
 
     bones: IntArray
     matrix: FloatArray
     width: int
+    watched: Any = None
 
     def __len__(self) -> int:
         return len(self.matrix)
@@ -41,6 +52,11 @@ class Track:
     def columns(self) -> IntArray:
         """(width b,) the columns of the stacked bones that the matrix multiplies."""
         return (self.bones[:, None] * self.width + np.arange(self.width)).ravel()
+
+    @property
+    def blocks(self) -> FloatArray:
+        """(k, b, width) the matrix by bones."""
+        return self.matrix.reshape(len(self), len(self.bones), self.width)
 
     def combined(self, other: Track, factor: float = 1.0) -> Track:
         """The track of self + factor * other, row by row."""
@@ -51,22 +67,27 @@ class Track:
             )
         bones = np.union1d(self.bones, other.bones)
         blocks = np.zeros((len(self), len(bones), self.width))
-        blocks[:, np.searchsorted(bones, self.bones)] += self.matrix.reshape(len(self), len(self.bones), self.width)
-        theirs = other.matrix.reshape(len(self), len(other.bones), self.width)
-        blocks[:, np.searchsorted(bones, other.bones)] += factor * theirs
-        return Track(bones, blocks.reshape(len(self), len(bones) * self.width), self.width)
+        blocks[:, np.searchsorted(bones, self.bones)] += self.blocks
+        blocks[:, np.searchsorted(bones, other.bones)] += factor * other.blocks
+        parts = [part for part in (self.watched, _times(factor, other.watched)) if part is not None]
+        watched = None if not parts else parts[0] if len(parts) == 1 else parts[0] + parts[1]
+        return Track(bones, blocks.reshape(len(self), len(bones) * self.width), self.width, watched)
 
     def rows(self, index: IntArray) -> Track:
         """The track of some of the rows, in the order of `index`."""
-        return Track(self.bones, self.matrix[index], self.width)
+        watched = None if self.watched is None else self.watched[index]
+        return Track(self.bones, self.matrix[index], self.width, watched)
 
     def scaled(self, factors: FloatArray) -> Track:
         """The track with each row times its factor (k,)."""
-        return Track(self.bones, self.matrix * factors[:, None], self.width)
+        watched = None if self.watched is None else self.watched.multiply(factors[:, None]).tocsr()
+        return Track(self.bones, self.matrix * factors[:, None], self.width, watched)
 
-    def gram(self, weights: FloatArray) -> FloatArray:
+    def gram(self, weights: FloatArray) -> Gram:
         """(width b, width b): sum_i weights_i h_i h_i^T, all that a weighted sum of squares needs of k rows."""
-        return self.matrix.T @ (weights[:, None] * self.matrix)
+        if self.watched is not None:
+            return Gram(np.zeros((0, 0)), weights)
+        return Gram(self.matrix.T @ (weights[:, None] * self.matrix), weights)
 
     @classmethod
     def stacked(cls, tracks: list[Track]) -> Track:
@@ -76,10 +97,31 @@ class Track:
         blocks = np.zeros((sum(map(len, tracks)), len(bones), width))
         row = 0
         for track in tracks:
-            columns = np.searchsorted(bones, track.bones)
-            blocks[row : row + len(track), columns] = track.matrix.reshape(len(track), len(track.bones), width)
+            blocks[row : row + len(track), np.searchsorted(bones, track.bones)] = track.blocks
             row += len(track)
-        return cls(bones, blocks.reshape(row, len(bones) * width), width)
+        return cls(bones, blocks.reshape(row, len(bones) * width), width, _stacked_watched(tracks))
+
+
+def watched_track(first: int, count: int, total: int, width: int) -> Track:
+    """The track of `count` points or normals that a black box evaluates, the `first`.. of all `total`."""
+    from scipy.sparse import csr_matrix
+
+    shares = csr_matrix((np.ones(count), (np.arange(count), np.arange(first, first + count))), shape=(count, total))
+    return Track(np.zeros(0, np.int64), np.zeros((count, 0)), width, shares)
+
+
+def _times(factor: float, watched: Any) -> Any:
+    return None if watched is None else factor * watched
+
+
+def _stacked_watched(tracks: list[Track]) -> Any:
+    total = next((track.watched.shape[1] for track in tracks if track.watched is not None), None)
+    if total is None:
+        return None
+    from scipy.sparse import csr_matrix, vstack
+
+    parts = [csr_matrix((len(t), total)) if t.watched is None else t.watched for t in tracks]
+    return vstack(parts, format="csr")
 
 
 def point_track(rig: Rig, points: SurfacePoints, first_bone: int = 0) -> Track:

@@ -14,6 +14,7 @@ import numpy as np
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.rig import Pose
 from contact_core.pose.state import PoseState
@@ -148,13 +149,19 @@ class PoseSolution:
 def patch_residuals(problem: PoseProblem, theta: FloatArray) -> dict[str, PatchResidual]:
     """Per contact pair: how far its points are apart and how well its surfaces face each other, at theta."""
     state = problem.state(theta)
-    meshes = {body.name: posed_mesh(problem, state, body.name) for body in problem.bodies}
+    meshes = {body.name: posed_mesh(problem, state, body.name) for body in problem.bodies if body.black_box is None}
+    seen = state.vectors(problem.pairs.manipulator_normals), state.vectors(problem.pairs.object_normals)
+
+    def normals(body: str, points: SurfacePoints, end: int, rows: slice) -> FloatArray:
+        return points.normals(meshes[body]) if body in meshes else seen[end][rows]
+
     gaps = np.linalg.norm(state.vectors(problem.pairs.gap), axis=1)
     result = {}
     for contact in problem.contacts:
-        gap = gaps[problem.pairs.rows[contact.name]]
-        mine = contact.manipulator_points.normals(meshes[contact.manipulator])
-        other = contact.object_points.normals(meshes[contact.object])
+        rows = problem.pairs.rows[contact.name]
+        gap = gaps[rows]
+        mine = normals(contact.manipulator, contact.manipulator_points, 0, rows)
+        other = normals(contact.object, contact.object_points, 1, rows)
         cosine = np.einsum("ki,ki->k", mine, other)
         if len(gap) == 0:
             continue

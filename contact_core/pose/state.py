@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contact_core.arrays import FloatArray
+from contact_core.pose.black_box import BlackBoxMotion
 from contact_core.pose.chart import Motion
-from contact_core.pose.skinning import Track, outward_carrier
+from contact_core.pose.skinning import Gram, Track, outward_carrier
 
 if TYPE_CHECKING:
     from contact_core.pose.problem import PoseProblem
@@ -28,10 +29,11 @@ class PoseState:
         # By identity; the track is kept beside its vectors so that its id stays its own.
         self._vectors: dict[int, tuple[Track, FloatArray]] = {}
         self._derivatives: dict[tuple[int, bytes], FloatArray] = {}
+        self._differences: dict[int, FloatArray] = {}  # of black boxes, by the width of a track
         self.memory: dict[object, Any] = {}  # what bound terms keep of this state for themselves
 
     @cached_property
-    def motions(self) -> tuple[Motion, ...]:
+    def motions(self) -> tuple[Motion | BlackBoxMotion, ...]:
         """The motion of every body, in the problem's order."""
         return self.problem.motions(self.theta)
 
@@ -45,7 +47,10 @@ class PoseState:
         key = id(track)
         if key not in self._vectors:
             carrier = self._bones if track.width == 4 else self._carriers
-            self._vectors[key] = track, track.matrix @ carrier[:, track.columns].T
+            vectors = track.matrix @ carrier[:, track.columns].T
+            if track.watched is not None:
+                vectors = vectors + track.watched @ self._watched[track.width]
+            self._vectors[key] = track, vectors
         return self._vectors[key][1]
 
     def pull(self, track: Track, forces: FloatArray) -> FloatArray:
@@ -53,20 +58,55 @@ class PoseState:
 
         The virtual work of the forces: accumulated per bone first, so the cost hardly knows d or k.
         """
+        d = len(self.theta)
         per_bone = forces.T @ track.matrix  # (3, width b)
-        return self._derivative(track).reshape(len(self.theta), -1) @ per_bone.ravel()
+        result = self._derivative(track).reshape(d, -1) @ per_bone.ravel()
+        if track.watched is not None:
+            result = (
+                result + self._watched_derivative(track.width).reshape(d, -1) @ (track.watched.T @ forces).ravel()
+            )
+        return result
 
-    def quadratic(self, track: Track, gram: FloatArray) -> FloatArray:
+    def quadratic(self, track: Track, gram: Gram) -> FloatArray:
         """(d, d) sum_i w_i J_i^T J_i over the track's rows, from `track.gram(w)`; costs nothing per row."""
         d = len(self.theta)
+        if track.watched is not None:
+            rows = self.jacobian(track) * np.sqrt(gram.weights)[:, None, None]  # (k, 3, d)
+            return rows.reshape(-1, d).T @ rows.reshape(-1, d)
         moved = self._derivative(track)  # (d, 3, width b)
-        return (moved.reshape(3 * d, -1) @ gram).reshape(d, -1) @ moved.reshape(d, -1).T
+        return (moved.reshape(3 * d, -1) @ gram.matrix).reshape(d, -1) @ moved.reshape(d, -1).T
 
     def jacobian(self, track: Track) -> FloatArray:
         """(k, 3, d) derivative of the track's vectors."""
         d = len(self.theta)
         flat = track.matrix @ self._derivative(track).reshape(3 * d, -1).T  # (k, 3 d)
-        return flat.reshape(len(track), d, 3).transpose(0, 2, 1)
+        result: FloatArray = flat.reshape(len(track), d, 3).transpose(0, 2, 1)
+        if track.watched is not None:
+            moved = self._watched_derivative(track.width).transpose(1, 2, 0)  # (m, 3, d)
+            result = result + (track.watched @ moved.reshape(len(moved), -1)).reshape(len(track), 3, d)
+        return result
+
+    @cached_property
+    def _watched(self) -> dict[int, FloatArray]:
+        """(m, 3) what black boxes evaluate: points under 4, normals under 3, as the widths of tracks."""
+        boxes = [motion for motion in self.motions if isinstance(motion, BlackBoxMotion)]
+        return {4: np.concatenate([b.points for b in boxes]), 3: np.concatenate([b.normals for b in boxes])}
+
+    def _watched_derivative(self, width: int) -> FloatArray:
+        """(d, m, 3) derivative of what black boxes evaluate."""
+        if not self._differences:
+            total = len(self._watched[4])
+            self._differences.update(
+                {4: np.zeros((len(self.theta), total, 3)), 3: np.zeros((len(self.theta), total, 3))}
+            )
+            first = 0
+            for index, motion in enumerate(self.motions):
+                if isinstance(motion, BlackBoxMotion):
+                    rows, columns = self.problem.dof_slices[index], slice(first, first + len(motion.points))
+                    moved, turned = motion.derivatives(self.problem.free_of_body[index])
+                    self._differences[4][rows, columns], self._differences[3][rows, columns] = moved, turned
+                    first += len(motion.points)
+        return self._differences[width]
 
     @cached_property
     def _bones(self) -> FloatArray:

@@ -147,9 +147,11 @@ def _attached(solid: _Solid, surface: FloatArray) -> Track:
 
 def _solid_names(problem: PoseProblem, term: PenetrationTerm) -> list[str]:
     if term.solids is None:
-        return [body.name for body in problem.bodies if len(body.rig.joints) == 1 and len(body.rig.faces)]
+        rigid = [body for body in problem.bodies if len(body.rig.joints) == 1 and body.black_box is None]
+        return [body.name for body in rigid if len(body.rig.faces)]
     for name in term.solids:
-        if len(problem.bodies[problem.body_index(name)].rig.joints) > 1:
+        body = problem.bodies[problem.body_index(name)]
+        if len(body.rig.joints) > 1 or body.black_box is not None:
             raise InvalidInput(f"a solid must be a rigid body, but {name!r} is skinned; self-collision handles it.")
     return list(term.solids)
 
