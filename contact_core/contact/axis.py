@@ -126,13 +126,14 @@ def root_from_point(
     *,
     mirrored: bool = False,
     unit: float = 1.0,
-) -> Root:
+) -> tuple[Root, float]:
     """The root from which the axis passes its point `index` at `point` with `tangent` there.
 
-    Walks the axis backwards. Raises InvalidInput where a boundary is in the way.
+    Walks the axis backwards. Also answers the length that a boundary cut off; unless that is 0, the root lies at
+    the boundary and the axis does not pass the point.
     """
     if index == 0:
-        return Root.at(point, tangent)
+        return Root.at(point, tangent), 0.0
     turns = -shape.turning_angles if mirrored else shape.turning_angles
     lengths = shape.lengths[:index][::-1] * (shape.along * unit)
     last = index == shape.point_count - 1
@@ -145,9 +146,7 @@ def root_from_point(
         -turns[: index - 1][::-1],
         lengths[1:],
     )
-    if back.remaining[0] > 1e-9 * mesh.bounding_box_diagonal:
-        raise InvalidInput("the axis would start beyond the boundary of the surface.")
-    return Root.at(back.points, -complex(back.headings[0]))
+    return Root.at(back.points, -complex(back.headings[0])), float(back.remaining[0])
 
 
 def _segments(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping
+from dataclasses import replace
 from typing import TypeVar, cast
 
 from contact_core.contact.axis import Axis, reconstruct_axis, root_from_point
@@ -50,12 +51,7 @@ class Derived:
 
     def root(self, document: ContactDocument, name: str) -> Root:
         """Where the axis of a patch starts, for a child as its parent's axis leads there."""
-        patch = document.patch(name)
-        link = patch.placement
-        if not isinstance(link, Link):
-            return link
-        key = ("root", self._axis_key(document, link.parent), link, self._shape_key(document, name))
-        return self._cached(key, 1, lambda: self._linked_root(document, name, link))
+        return self._root_and_cut(document, name)[0]
 
     def axis(self, document: ContactDocument, name: str) -> Axis:
         """The axis of a patch on its surface."""
@@ -64,13 +60,10 @@ class Derived:
 
         def trace() -> Axis:
             self.computed += 1
-            return reconstruct_axis(
-                self.mesh(document, patch.surface),
-                shape,
-                self.root(document, name),
-                mirrored=patch.mirrored,
-                unit=self.unit(document, name),
-            )
+            root, cut = self._root_and_cut(document, name)
+            mesh, unit = self.mesh(document, patch.surface), self.unit(document, name)
+            axis = reconstruct_axis(mesh, shape, root, mirrored=patch.mirrored, unit=unit)
+            return axis if cut == 0.0 else replace(axis, remaining=axis.remaining + cut)
 
         return self._cached(("axis", self._axis_key(document, name)), shape.point_count, trace)
 
@@ -93,11 +86,19 @@ class Derived:
 
         return self._cached(("points", self._axis_key(document, name), coordinates.digest), len(coordinates), trace)
 
-    def _linked_root(self, document: ContactDocument, name: str, link: Link) -> Root:
+    def _root_and_cut(self, document: ContactDocument, name: str) -> tuple[Root, float]:
+        """The root, and the length that boundaries cut off on the way to it from the parents (0 without)."""
+        link = document.patch(name).placement
+        if not isinstance(link, Link):
+            return link, 0.0
+        key = ("root", self._axis_key(document, link.parent), link, self._shape_key(document, name))
+        return self._cached(key, 1, lambda: self._linked_root(document, name, link))
+
+    def _linked_root(self, document: ContactDocument, name: str, link: Link) -> tuple[Root, float]:
         patch = document.patch(name)
-        mesh = self.mesh(document, patch.surface)
-        point, tangent, _ = follow_link(mesh, self.axis(document, link.parent), link)
-        return root_from_point(
+        mesh, parent = self.mesh(document, patch.surface), self.axis(document, link.parent)
+        point, tangent, cut = follow_link(mesh, parent, link)
+        root, cut_off = root_from_point(
             mesh,
             document.effective_axis(name),
             link.own_point,
@@ -106,6 +107,7 @@ class Derived:
             mirrored=patch.mirrored,
             unit=self.unit(document, name),
         )
+        return root, cut + cut_off + float(parent.remaining[link.parent_point])
 
     def _axis_key(self, document: ContactDocument, name: str) -> Hashable:
         """All that the axis of a patch depends on, by value."""

@@ -45,7 +45,7 @@ class PlacingVerbs(Editor):
         axis = self.axis(patch)
         if not 0 < about < len(axis):
             raise CommandRejected(f"the axis of {patch!r} has the points 0..{len(axis) - 1}, but {about} came.")
-        root = root_from_point(
+        root, cut = root_from_point(
             self.mesh_of(patch),
             self.document.effective_axis(patch),
             about,
@@ -54,6 +54,8 @@ class PlacingVerbs(Editor):
             mirrored=self.document.patch(patch).mirrored,
             unit=self.derived.unit(self.document, patch),
         )
+        if cut > 0.0:
+            raise CommandRejected(f"turned about point {about}, the axis of {patch!r} would start off the surface.")
         return self.submit(Rotate(patch, self.placement_at(patch, root)))
 
     def bend(self, patch: str, point: int, angle: float) -> int:
