@@ -10,6 +10,7 @@ import pytest
 from contact_builtins.axes.along_bone import AlongBone
 from contact_builtins.axes.consistent import Consistent
 from contact_builtins.axes.farthest_pair import FarthestPair
+from contact_builtins.axes.guided import Guided
 from contact_builtins.axes.medial_axis import MedialAxis
 from contact_builtins.axes.principal import Principal
 from contact_core.contact.axis_generator import AxisGenerator, AxisRequest
@@ -43,6 +44,12 @@ class TestConsistent(AxisGeneratorContract):
         return Consistent()
 
 
+class TestGuided(AxisGeneratorContract):
+    @pytest.fixture
+    def generator(self) -> AxisGenerator:
+        return Guided()
+
+
 class TestAlongBone(AxisGeneratorContract):
     cannot = {"without_rig": "it follows a bone, so it refuses in words where there is none"}
 
@@ -61,7 +68,7 @@ def strip(angle: float) -> AxisRequest:
     return AxisRequest(
         mesh,
         on_plane(spots),
-        bones=np.array([[[0.0, 0.5, 0.3], [1.0, 0.5, 0.3]]]),
+        bones=np.array([[[0.0, 0.5, -0.3], [1.0, 0.5, -0.3]]]),
         bone_of_point=np.zeros(160, np.int64),
     )
 
@@ -97,7 +104,7 @@ def test_along_bone_follows_the_bone_whatever_the_patch(angle: float) -> None:
 
 def test_along_bone_refuses_a_bone_that_stands_upright() -> None:
     upright = replace(strip(0.0), bones=np.array([[[0.5, 0.5, 0.0], [0.5, 0.5, 1.0]]]))
-    with pytest.raises(InvalidInput, match="stands upright"):
+    with pytest.raises(InvalidInput, match="does not stand upright"):
         AlongBone().generate(upright)
 
 
@@ -129,17 +136,44 @@ def test_consistent_is_parallel_to_the_axis_that_is_drawn() -> None:
 
 
 def test_consistent_needs_no_plane() -> None:
-    """Carried round a tube and back along it, a direction along the tube stays along the tube."""
+    """Round a tube, a direction along the tube stays along the tube, with a bone and without."""
     tube = meshes.cylinder(24, 14)
     along = np.array([0.0, 0.0, 1.0])
     first = scattered(tube, np.array([0.5, 0.0, 0.5]), np.array([0.4, 0.3, 0.3]), seed=1)
     second = scattered(tube, np.array([-0.4, 0.3, 1.4]), np.array([0.4, 0.3, 0.3]), seed=2)
     drawn = AlongBone().generate(replace(first, bones=np.array([[-along, along]])))
-    axis = Consistent().generate(replace(second, other_axes={"first": drawn}))
-    assert direction(second, axis) @ along > np.cos(np.radians(2.0))
+    for bones in (None, np.array([[np.zeros(3), along]])):
+        axis = Consistent().generate(replace(second, bones=bones, other_axes={"first": drawn}))
+        assert direction(second, axis) @ along > np.cos(np.radians(2.0))
 
 
-@pytest.mark.parametrize("generator", [Principal(), MedialAxis(), Consistent(), AlongBone()])
+def test_consistent_keeps_the_angle_to_the_bone() -> None:
+    """Crosswise on one of two fingers, crosswise to the left on the other, which points elsewhere."""
+    mesh = meshes.plane(12)
+    bones = np.array([[[0.2, 0.1, -0.1], [0.2, 0.9, -0.1]], [[0.5, 0.3, -0.1], [0.9, 0.7, -0.1]]])
+    spots = np.array([0.7, 0.5]) + 0.1 * (np.random.default_rng(0).random((60, 2)) - 0.5)
+    request = AxisRequest(mesh, on_plane(spots), bones=bones, bone_of_point=np.ones(60, np.int64))
+    crosswise = on_plane(np.array([[0.3, 0.5], [0.1, 0.5]]))  # to the left of the first bone, seen from above
+    axis = Consistent().generate(replace(request, other_axes={"first": crosswise}))
+    assert direction(request, axis)[:2] == pytest.approx([-np.sqrt(0.5), np.sqrt(0.5)], abs=1e-6)
+
+
+@pytest.mark.parametrize(("angle", "wanted"), [(0.2, 0.2), (3.3, 3.3 - np.pi), (1.4, 1.4), (-1.4, np.pi - 1.4)])
+def test_guided_follows_a_stroke_and_never_runs_against_the_bone(angle: float, wanted: float) -> None:
+    request = strip(angle)  # the bone lies along x
+    found = direction(request, Guided().generate(request))
+    assert found[:2] @ [np.cos(wanted), np.sin(wanted)] > np.cos(np.radians(3.0))
+
+
+def test_guided_takes_the_bone_for_a_round_patch() -> None:
+    random = np.random.default_rng(5)
+    radius, angle = 0.2 * np.sqrt(random.random(300)), 2.0 * np.pi * random.random(300)
+    spots = 0.5 + np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
+    request = replace(strip(0.0), points=on_plane(spots), bone_of_point=np.zeros(300, np.int64))
+    assert direction(request, Guided().generate(request)) == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("generator", [Principal(), MedialAxis(), Consistent(), AlongBone(), Guided()])
 def test_a_patch_in_two_parts_is_refused(generator: AxisGenerator) -> None:
     mesh = meshes.copies(meshes.saddle(8), 2)
     faces = np.array([0, 1, 2, len(mesh.faces) - 1, len(mesh.faces) - 2])

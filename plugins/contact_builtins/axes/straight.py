@@ -10,6 +10,7 @@ from contact_core.arrays import ComplexArray, FloatArray
 from contact_core.contact.axis_generator import AxisRequest
 from contact_core.errors import InvalidInput
 from contact_core.geometry import SurfacePoints, TriangleMesh, log_map, trace_geodesic
+from contact_core.geometry.tangent import direction_to_heading
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,22 @@ def principal_heading(flat: Flattened) -> complex:
     """The direction along which the flattened patch is longest, as a unit heading at the centre; its sign is that
     of the third moment, which depends on the patch alone."""
     plane = flat.plane - flat.plane.mean()
-    double = complex((plane**2).mean())  # twice the angle of the direction of largest spread
-    heading = complex(np.exp(0.5j * np.angle(double)))
+    heading = complex(np.exp(0.5j * np.angle((plane**2).mean())))  # a square has twice the angle, and no sign
     return heading if float(((plane * np.conj(heading)).real ** 3).sum()) >= 0.0 else -heading
+
+
+def elongation(flat: Flattened) -> float:
+    """How much longer than wide the flattened patch is: the ratio of its principal spreads, 1 for a round one."""
+    plane = flat.plane - flat.plane.mean()
+    mean, skew = float((np.abs(plane) ** 2).mean()), float(abs((plane**2).mean()))  # their sum and difference
+    return float(np.sqrt((mean + skew) / max(mean - skew, 1e-300)))
+
+
+def projected_heading(flat: Flattened, direction: FloatArray) -> complex | None:
+    """A direction in space (3,) laid onto the surface at the centre, a unit heading; None where it stands
+    upright."""
+    normal = flat.centre.normals(flat.mesh)[0]
+    lying = direction - normal * float(direction @ normal)
+    if np.linalg.norm(lying) < 0.05 * np.linalg.norm(direction):
+        return None
+    return complex(direction_to_heading(flat.mesh, flat.centre, lying[None])[0])
