@@ -7,6 +7,7 @@ parents evaluated in between, and a loop over a finger is then wrong by a whole 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -110,7 +111,9 @@ def _write_rotation(pose_bone: Any, rotation: Rotation) -> str:
         places = ["XYZ".index(axis) for axis in mode]
         before = np.array(pose_bone.rotation_euler)[places]
         angles = np.empty(3)
-        angles[places] = _near(rotation.as_euler(mode.lower()), before)
+        with warnings.catch_warnings():  # in gimbal lock any split of the two turns is right
+            warnings.simplefilter("ignore", UserWarning)
+            angles[places] = _near(rotation.as_euler(mode.lower()), before)
         pose_bone.rotation_euler = angles.tolist()
     return channel
 

@@ -127,10 +127,7 @@ def _write_rest_and_freedoms(armature: Any, rig: Rig) -> None:
     noise = _REST_NOISE * max(1.0, float(np.abs(rig.bind_points).max(initial=0.0)))
     for place, name in enumerate(rig.joints):
         pose_bone = armature.pose.bones[name]
-        freedom = rig.freedoms[place]
-        write_freedom(pose_bone, freedom)
-        if rig.parents[place] < 0 and not freedom.translates:
-            pose_bone.lock_location = (True, True, True)
+        write_freedom(pose_bone, rig.freedoms[place])
         if np.abs(offset[place] - np.eye(4)).max() > noise:
             pose_bone[REST_BASIS] = offset[place].ravel().tolist()
             write_basis(pose_bone, offset[place])

@@ -29,7 +29,7 @@ def freedom_of(pose_bone: Any, translates: bool) -> JointFreedom:
             ValueError, KeyError, TypeError
         ):  # somebody else's or damaged: Blender's view counts
             exact, then = json.loads(kept)
-            if then == to_json(native):
+            if then == _seen(pose_bone):
                 return from_json(exact)
     return native
 
@@ -114,7 +114,14 @@ def write_freedom(pose_bone: Any, freedom: JointFreedom) -> None:
         pose_bone.rotation_mode = order[::-1]
     pose_bone.lock_rotation = tuple(bool(lock) for lock in locks)
     _add_limits(pose_bone, lower, upper)
-    pose_bone[_KEPT] = json.dumps([to_json(freedom), to_json(_native(pose_bone, freedom.translates))])
+    if pose_bone.parent is None:
+        pose_bone.lock_location = 3 * (not freedom.translates,)
+    pose_bone[_KEPT] = json.dumps([to_json(freedom), _seen(pose_bone)])
+
+
+def _seen(pose_bone: Any) -> list[Any]:
+    """What an artist can change of a bone's freedom, as plain values."""
+    return [to_json(_native(pose_bone, False)), list(pose_bone.lock_location)]
 
 
 def _add_limits(pose_bone: Any, lower: Any, upper: Any) -> None:

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from contact_blender.host import BlenderHost
+from contact_blender.host import BlenderHost as BlenderHost
 from contact_core.pose.rig import Rig
 from contact_core.testing.host_scenes import HostScene
 
@@ -76,7 +76,7 @@ def whole_state() -> Any:
         if item.type == "ARMATURE":
             state.append([_bone_state(bone) for bone in item.pose.bones])
             state.append([_curve_state(curve) for curve in _curves(item)])
-    kept = sorted(key for key in bpy.context.scene.keys())  # noqa: SIM118  (an ID is no dict)
+    kept = sorted(bpy.context.scene.keys())
     datablocks = [len(bpy.data.scenes), len(bpy.data.meshes), len(bpy.data.actions), len(bpy.data.armatures)]
     document = bpy.context.scene.get("contact_core")
     return [*state, kept, datablocks, None if document is None else (document["revision"], bytes(document["data"]))]

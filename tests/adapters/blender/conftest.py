@@ -32,18 +32,23 @@ if IN_BLENDER:
 
     @pytest.fixture
     def bpy() -> Any:
-        """Blender with an empty scene and nothing to undo."""
+        """Blender as the test before left it: tests build their own scene, or ask for an `empty` one."""
         import bpy
 
-        bpy.ops.wm.read_factory_settings(use_empty=True)
         return bpy
 
     @pytest.fixture
-    def scenes(bpy: Any) -> Any:
+    def scenes() -> Any:
         """The module that makes Blender scenes by Blender's own means."""
         import blender_scenes
 
         return blender_scenes
+
+    @pytest.fixture
+    def empty(bpy: Any, scenes: Any) -> Any:
+        """A host on an empty scene with nothing to undo."""
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        return scenes.BlenderHost()
 
     def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         if REPORTS in os.environ:

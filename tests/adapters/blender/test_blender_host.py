@@ -13,7 +13,7 @@ from contact_core.testing.host_contract import Build, HostContract
 class TestBlenderHost(HostContract):
     subject = "blender"
     spaces = (SceneSpace(1.0, "Z"), SceneSpace(0.01, "Z"))  # Blender's up axis is Z
-    cannot = {  # noqa: RUF012
+    cannot = {
         "display": "the overlay needs a window; patches are shown by the add-on's draw handler",
         "picking": "there is no region without a window; the add-on's tools cast their own rays",
     }
