@@ -50,6 +50,8 @@ class GltfFiles:
 
         if Path(path).suffix.lower() != ".glb":
             raise FileRefused(f"{path}: glTF is written as one binary file; let its name end in .glb.")
+        if not Path(path).absolute().parent.is_dir():
+            raise FileRefused(f"{path} cannot be written: there is no folder {Path(path).parent}. Make it first.")
         write_whole(path, glb_bytes(assets, poses))
 
 

@@ -94,7 +94,8 @@ class Gltf:
         count = bounded(entry["count"], f"elements of accessors[{index}]")
         if "bufferView" in entry:
             values = self._elements(entry["bufferView"], entry.get("byteOffset", 0), kind, count, width)
-        else:
+        else:  # all zero, and free of charge in the file: hence a bound of its own
+            bounded(count * width * 8, "zeros")
             values = np.zeros((count, width), kind)
         if "sparse" in entry:
             values = self._with_sparse(values, entry["sparse"], kind, width)

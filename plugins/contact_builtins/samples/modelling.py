@@ -99,7 +99,8 @@ def collapse_short_edges(points: FloatArray, faces: IntArray, edge: float | Sizi
     from scipy.sparse import coo_array
 
     count = len(points)
-    pairs = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)  # (e, 2)
+    halfedges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    pairs = np.stack(np.divmod(np.unique(halfedges[:, 0] * count + halfedges[:, 1]), count), axis=1)  # (e, 2)
     middle = points[pairs].mean(axis=1)
     length = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     wanted = edge(middle) if callable(edge) else np.full(len(pairs), edge)
