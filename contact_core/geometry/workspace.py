@@ -44,7 +44,8 @@ class Workspace:
         self.items: IntArray = np.empty(2 * windows, np.int64)
 
     def grow(self) -> None:
-        """Four times the room; the query that overflowed starts again."""
+        """Four times the room, and a new epoch: the query that overflowed starts again from nothing."""
+        self.epoch += 1.0
         self.reserve(4 * len(self.floats))
 
     @property
