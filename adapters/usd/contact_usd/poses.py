@@ -41,10 +41,16 @@ def key_frames(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> tuple[float,
 def write(
     stage: Usd.Stage, cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton, local: FloatArray, frame: float | None
 ) -> None:
-    """Write a whole pose (j, 4, 4). The stage's edit target must be our layer. Raises InvalidInput."""
+    """Write a whole pose (j, 4, 4) into an animation beside the skeleton; the edit target must be our layer.
+
+    Raises InvalidInput for what a SkelAnimation cannot hold.
+    """
     _check_scales(local, str(skeleton.GetPath()))
     query = cache.GetSkelQuery(skeleton)
-    path = animation_path(skeleton)
+    path = skeleton.GetPrim().GetPath()
+    make_editable(stage, path)
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath(path))
+    path = path.GetParentPath().AppendChild(f"{path.name}_ContactPose")
     animation = UsdSkel.Animation.Get(stage, path)
     if not animation:
         animation = UsdSkel.Animation.Define(stage, path)
@@ -56,15 +62,13 @@ def write(
     animation.SetTransforms(Vt.Matrix4dArray([gf_matrix(m) for m in local]), time)
 
 
-def animation_path(skeleton: UsdSkel.Skeleton) -> Sdf.Path:
-    """Where our animation of a skeleton is: beside it. Raises InvalidInput inside an instance."""
-    prim = skeleton.GetPrim()
-    if prim.IsInstanceProxy():
-        raise InvalidInput(
-            f"{prim.GetPath()} lies in an instance, which is read-only. Make it uninstanced"
-            " (instanceable = false) on the instance prim to pose it."
-        )
-    return prim.GetPath().GetParentPath().AppendChild(f"{prim.GetName()}_ContactPose")
+def make_editable(stage: Usd.Stage, path: Sdf.Path) -> None:
+    """A prim inside an instance is read-only: the instances above it stop being instances, in our layer."""
+    while stage.GetPrimAtPath(path).IsInstanceProxy():
+        prim = stage.GetPrimAtPath(path)
+        while not prim.IsInstance() or prim.IsInstanceProxy():
+            prim = prim.GetParent()
+        prim.SetInstanceable(False)
 
 
 def _copy_source(query: UsdSkel.SkeletonQuery, animation: UsdSkel.Animation) -> None:

@@ -1,0 +1,193 @@
+"""Contacts as prims that any USD host can show: Points for patches, BasisCurves for axes, relationships for pairs.
+
+The document on /Contacts is the truth; what lies below it is derived, for viewers and other tools. Every value is
+authored and found again by its property, so all of it can be read without our schema plugin.
+
+    /Contacts                   Scope, ContactDocumentAPI
+    /Contacts/Patches/tip       Points, ContactPatchAPI
+    /Contacts/Patches/tip_axis  BasisCurves, a sibling: inside Points it would be an invalid nested gprim
+    /Contacts/Pairs/tip_mug     Scope, ContactPairAPI
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+
+from contact_core.arrays import FloatArray
+from contact_core.errors import InvalidInput
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.session import Session
+from contact_usd.host import UsdHost
+from contact_usd.storage import ROOT, contacts_prim
+
+PATCHES, PAIRS = ROOT.AppendChild("Patches"), ROOT.AppendChild("Pairs")
+_SIZE = 0.35  # width of a drawn point, of the mean spacing of the patch's points
+_TYPES = Sdf.ValueTypeNames
+
+
+@dataclass(frozen=True, eq=False)
+class PatchPrim:
+    """A patch as it stands in a stage. surface: prim path. positions: (k, 3) world. axis: None for one point."""
+
+    name: str
+    surface: str
+    points: SurfacePoints
+    positions: FloatArray
+    axis: SurfacePoints | None
+    role: str
+    topology: str
+
+
+@dataclass(frozen=True)
+class PairPrim:
+    """A pair as it stands in a stage, by the names of its patches."""
+
+    name: str
+    manipulator: str
+    object: str
+    weight: float
+
+
+def publish(host: UsdHost, session: Session, prims: Mapping[str, str]) -> None:
+    """Write the session's patches, axes and pairs in place of those published before: one undo step.
+
+    prims: path of the Mesh or Skeleton behind each of the document's surfaces. Raises InvalidInput for a patch on
+    a surface that `prims` does not name.
+    """
+    document = session.document
+    missing = sorted({patch.surface for patch in document.patches.values()} - set(prims))
+    if missing:
+        raise InvalidInput(f"publishing needs the prim of the surface {missing[0]!r}; given are {sorted(prims)}.")
+    paths = {name: PATCHES.AppendChild(key) for name, key in _identifiers(document.patches).items()}
+    with host.step("Publish contacts"), Usd.EditContext(host.stage, Usd.EditTarget(host.layer)):
+        for scope in (PATCHES, PAIRS):
+            host.stage.RemovePrim(scope)
+        contacts_prim(host.layer)
+        for scope in (PATCHES, PAIRS):
+            UsdGeom.Scope.Define(host.stage, scope)
+        for name, path in paths.items():
+            _write_patch(host.stage, path, session, name, Sdf.Path(prims[document.patches[name].surface]))
+        for name, key in _identifiers(document.pairs).items():
+            pair = document.pairs[name]
+            prim = UsdGeom.Scope.Define(host.stage, PAIRS.AppendChild(key)).GetPrim()
+            prim.AddAppliedSchema("ContactPairAPI")
+            _text(prim, "contact:name", name)
+            prim.CreateRelationship("contact:manipulator", False).SetTargets([paths[pair.manipulator]])
+            prim.CreateRelationship("contact:object", False).SetTargets([paths[pair.object]])
+            prim.CreateAttribute("contact:weight", _TYPES.Float, False, Sdf.VariabilityUniform).Set(pair.weight)
+
+
+def read_patches(stage: Usd.Stage) -> tuple[PatchPrim, ...]:
+    """All published patches, by their properties: the schema need not be known."""
+    found = []
+    for prim in stage.Traverse():
+        face = prim.GetAttribute("primvars:contact:face")
+        surface = prim.GetRelationship("contact:surface")
+        if not (prim.IsA(UsdGeom.Points) and face and face.HasAuthoredValue() and surface):
+            continue
+        axis = prim.GetRelationship("contact:axis").GetTargets()
+        targets = surface.GetTargets()
+        found.append(
+            PatchPrim(
+                prim.GetAttribute("contact:name").Get(),
+                str(targets[0]) if targets else "",
+                _surface_points(prim),
+                np.asarray(UsdGeom.Points(prim).GetPointsAttr().Get(), np.float64),
+                _surface_points(stage.GetPrimAtPath(axis[0])) if axis else None,
+                str(prim.GetAttribute("contact:role").Get()),
+                prim.GetAttribute("contact:topology").Get(),
+            )
+        )
+    return tuple(found)
+
+
+def read_pairs(stage: Usd.Stage) -> tuple[PairPrim, ...]:
+    """All published pairs."""
+    found = []
+    for prim in stage.Traverse():
+        ends = [prim.GetRelationship(f"contact:{end}") for end in ("manipulator", "object")]
+        if all(ends) and all(end.GetTargets() for end in ends):
+            one, other = (
+                stage.GetPrimAtPath(end.GetTargets()[0]).GetAttribute("contact:name").Get() for end in ends
+            )
+            weight = float(prim.GetAttribute("contact:weight").Get())
+            found.append(PairPrim(prim.GetAttribute("contact:name").Get(), one, other, weight))
+    return tuple(found)
+
+
+def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, surface_path: Sdf.Path) -> None:
+    patch = session.document.patches[name]
+    surface = session.document.surfaces[patch.surface]
+    mesh = session.posed_mesh(patch.surface)  # what the animator sees; the triangles are those of the rest pose
+    points = session.reconstruction(name).points
+    positions = _placed(points.positions(mesh), surface.world_from_surface)
+    drawn = UsdGeom.Points.Define(stage, path)
+    prim = drawn.GetPrim()
+    prim.AddAppliedSchema("ContactPatchAPI")
+    spacing = float(np.linalg.norm(np.ptp(positions, axis=0))) / max(np.sqrt(len(positions)), 1.0)
+    drawn.CreateWidthsAttr(Vt.FloatArray([_SIZE * spacing] * len(positions)))
+    _write_points(drawn, positions, points, patch.color)
+    _text(prim, "contact:name", name)
+    _text(prim, "contact:topology", surface.topology_digest)
+    role = "original" if patch.original else "transferred"
+    prim.CreateAttribute("contact:role", _TYPES.Token, False, Sdf.VariabilityUniform).Set(role)
+    prim.CreateRelationship("contact:surface", False).SetTargets([surface_path])
+    axis = session.axis(name).points
+    targets = []
+    if len(axis) > 1:
+        curve_path = path.GetParentPath().AppendChild(f"{path.name}_axis")
+        curves = UsdGeom.BasisCurves.Define(stage, curve_path)
+        curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+        curves.CreateCurveVertexCountsAttr(Vt.IntArray([len(axis)]))
+        curves.CreateWidthsAttr(Vt.FloatArray([_SIZE * spacing]))
+        curves.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+        _write_points(curves, _placed(axis.positions(mesh), surface.world_from_surface), axis, patch.color)
+        targets = [curve_path]
+    prim.CreateRelationship("contact:axis", False).SetTargets(targets)
+
+
+def _write_points(
+    drawn: UsdGeom.PointBased, positions: FloatArray, points: SurfacePoints, color: tuple[float, float, float]
+) -> None:
+    """Positions, colour, faces and barycentric coordinates; what USD draws and what the patch is."""
+    drawn.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(positions.astype(np.float32)))
+    drawn.CreateExtentAttr(UsdGeom.Boundable.ComputeExtentFromPlugins(drawn, Usd.TimeCode.Default()))
+    drawn.CreateDisplayColorAttr(Vt.Vec3fArray([color]))
+    primvars = UsdGeom.PrimvarsAPI(drawn)
+    vertex = UsdGeom.Tokens.vertex
+    faces = Vt.IntArray.FromNumpy(points.faces.astype(np.int32))
+    primvars.CreatePrimvar("contact:face", _TYPES.IntArray, vertex).Set(faces)
+    bary = Vt.Vec3fArray.FromNumpy(points.barycentric.astype(np.float32))
+    primvars.CreatePrimvar("contact:bary", _TYPES.Float3Array, vertex).Set(bary)
+
+
+def _surface_points(prim: Usd.Prim) -> SurfacePoints:
+    faces = np.asarray(prim.GetAttribute("primvars:contact:face").Get(), np.int64)
+    bary = np.asarray(prim.GetAttribute("primvars:contact:bary").Get(), np.float64).reshape(-1, 3)
+    return SurfacePoints(faces, bary / bary.sum(axis=1, keepdims=True))
+
+
+def _placed(points: FloatArray, world: FloatArray) -> FloatArray:
+    return points @ world[:3, :3].T + world[:3, 3]
+
+
+def _text(prim: Usd.Prim, attribute: str, value: str) -> None:
+    prim.CreateAttribute(attribute, _TYPES.String, False, Sdf.VariabilityUniform).Set(value)
+
+
+def _identifiers(names: Mapping[str, object]) -> dict[str, str]:
+    """A prim name for each name, unique, also beside the names of axes."""
+    taken: set[str] = set()
+    result = {}
+    for name in names:
+        valid = Tf.MakeValidIdentifier(name)
+        key, number = valid, 2
+        while {key, f"{key}_axis"} & taken:
+            key, number = f"{valid}_{number}", number + 1
+        taken |= {key, f"{key}_axis"}
+        result[name] = key
+    return result

@@ -1,0 +1,212 @@
+"""One layer is ours: what is written there, how it is undone, found again, and seen without our schema."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr", reason="usd-core is not installed")
+
+from pxr import Gf, Usd, UsdGeom
+
+from contact_core.document.asset import Asset
+from contact_core.document.schema import VERSION, parse_document, same_documents
+from contact_core.errors import FileRefused
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.host import StoredDocument
+from contact_core.session import Session
+from contact_core.testing import meshes
+from contact_core.testing.host_scenes import arm_rig, bent
+from contact_usd import contacts, schema_dir
+from contact_usd.host import UsdHost
+from contact_usd.validate import problems
+
+
+def torus_host() -> tuple[UsdHost, Session, str]:
+    """A torus on a stage of our own, with one painted patch and a copy that it is paired with."""
+    host = UsdHost()
+    key = host.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
+    session = Session(host=host, discover=False)
+    mesh = host.read_surface(key).mesh
+    session.add_surface("torus", mesh, world_from_surface=host.placement(key))
+    order = np.argsort(np.linalg.norm(mesh.points - mesh.points[0], axis=1), kind="stable")[:30]
+    axis = SurfacePoints.at_vertices(mesh, order[[0, 12]])
+    session.paint("grip (links)", SurfacePoints.at_vertices(mesh, order), surface="torus", axis=axis)
+    far = SurfacePoints.at_vertices(mesh, [int(np.argmax(np.linalg.norm(mesh.points - mesh.points[0], axis=1)))])
+    copy = session.transfer("grip (links)", "torus", far, heading=1.0 + 0.0j, mirrored=False)
+    session.pair("grip (links)", copy)
+    return host, session, key
+
+
+def test_patches_axes_and_pairs_come_back_equal(tmp_path: Path) -> None:
+    host, session, key = torus_host()
+    contacts.publish(host, session, {"torus": key})
+    host.save(tmp_path / "ours.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "ours.usda"))
+    found = {patch.name: patch for patch in contacts.read_patches(stage)}
+    assert set(found) == set(session.document.patches)
+    for name, patch in found.items():
+        ours = session.reconstruction(name).points
+        np.testing.assert_array_equal(patch.points.faces, ours.faces)
+        np.testing.assert_allclose(patch.points.barycentric, ours.barycentric, atol=1e-6)
+        np.testing.assert_allclose(patch.positions, ours.positions(session.meshes["torus"]), atol=1e-6)
+        assert patch.axis is not None
+        np.testing.assert_array_equal(patch.axis.faces, session.axis(name).points.faces)
+        assert (patch.surface, patch.topology) == (key, session.meshes["torus"].topology_digest)
+        assert patch.role == ("original" if session.document.patches[name].original else "transferred")
+    (pair,) = contacts.read_pairs(stage)
+    (wanted,) = session.document.pairs.values()
+    assert (pair.name, pair.manipulator, pair.object) == (wanted.name, wanted.manipulator, wanted.object)
+    contacts.publish(host, session, {"torus": key})  # again: in place of the first
+    assert len(contacts.read_patches(host.stage)) == len(found)
+
+
+def test_usds_own_validators_find_no_error_in_our_layer(tmp_path: Path) -> None:
+    pytest.importorskip("pxr.UsdValidation", reason="this pxr has no UsdValidation")
+    host, session, key = torus_host()
+    rig = arm_rig()
+    arm = host.add(Asset("arm", rig.surface, rig, meters_per_unit=1.0))
+    for frame in (1.0, 2.0):
+        host.write_pose(arm, bent(rig, 1), frame)
+    contacts.publish(host, session, {"torus": key})
+    host.layer.defaultPrim = "Contacts"
+    host.save(tmp_path / "ours.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "ours.usda"))
+    assert problems(stage) == ()
+    patch = stage.GetPrimAtPath(contacts.PATCHES).GetChildren()[0]
+    UsdGeom.Points.Define(stage, patch.GetPath().AppendChild("nested"))
+    assert any("Nested" in problem for problem in problems(stage))  # the validators do look
+
+
+NEW_PROCESS = """
+import json, sys
+from pxr import Usd, UsdGeom
+early = Usd.Stage.Open(sys.argv[1]) if sys.argv[2] == "late" else None
+if sys.argv[2] != "without":
+    from contact_usd.host import UsdHost
+    host = UsdHost(sys.argv[1])
+    stage, problem = host.stage, host.schema_problem
+else:
+    stage, problem = Usd.Stage.Open(sys.argv[1]), None
+patch = next(p for p in stage.Traverse() if p.GetName().startswith("grip"))
+print(json.dumps({
+    "known": [str(n) for n in patch.GetAppliedSchemas()], "problem": problem,
+    "points": len(UsdGeom.Points(patch).GetPointsAttr().Get()),
+    "faces": len(patch.GetAttribute("primvars:contact:face").Get()),
+    "surface": str(patch.GetRelationship("contact:surface").GetTargets()[0]),
+    "revision": stage.GetPrimAtPath("/Contacts").GetAttribute("contact:revision").Get()}))
+"""
+
+
+@pytest.mark.parametrize("plugin", ["with", "without", "late", "environment"])
+def test_a_new_process_reads_it_with_and_without_the_schema(plugin: str, tmp_path: Path) -> None:
+    host, session, key = torus_host()
+    contacts.publish(host, session, {"torus": key})
+    host.save(tmp_path / "ours.usda")
+    environment = {k: v for k, v in os.environ.items() if k != "PXR_PLUGINPATH_NAME"}
+    if plugin == "environment":  # a host that loads USD first, started with our folder on USD's path
+        environment["PXR_PLUGINPATH_NAME"] = str(schema_dir())
+    how = "late" if plugin == "environment" else plugin
+    command = [sys.executable, "-c", NEW_PROCESS, str(tmp_path / "ours.usda"), how]
+    run = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+    seen = json.loads(run.stdout.splitlines()[-1])
+    assert seen["points"] == seen["faces"] == 30 and seen["surface"] == key
+    assert seen["revision"] == session.revision
+    assert seen["known"] == (["ContactPatchAPI"] if plugin in ("with", "environment") else [])
+    if plugin == "late":
+        assert "PXR_PLUGINPATH_NAME" in seen["problem"] and str(schema_dir()) in seen["problem"]
+    else:
+        assert seen["problem"] is None
+
+
+def test_schema_files_are_what_usd_generates(repository: Path) -> None:
+    pytest.importorskip("jinja2", reason="usdGenSchema needs jinja2")
+    generator = repository / "adapters" / "usd" / "generate_schema.py"
+    spec = importlib.util.spec_from_file_location("generate_schema", generator)
+    assert spec is not None and spec.loader is not None
+    module: ModuleType = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for name, text in module.generate().items():
+        assert (schema_dir() / name).read_text(encoding="utf-8") == text, (
+            f"run adapters/usd/generate_schema.py: {name}"
+        )
+
+
+def test_sources_are_never_written(tmp_path: Path) -> None:
+    source = tmp_path / "source.usda"
+    made = UsdHost()
+    key = made.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
+    made.layer.customLayerData = {}  # a file like any other
+    made.save(source)
+    before = hashlib.sha256(source.read_bytes()).hexdigest()
+    host = UsdHost(source)
+    host.store_document(StoredDocument(b"{}", 1, VERSION))
+    with pytest.raises(FileRefused, match="never written"):
+        host.save(source)
+    host.save()
+    assert (tmp_path / "source.contact.usda").exists()
+    assert hashlib.sha256(source.read_bytes()).hexdigest() == before
+    assert "@./source.usda@" in (tmp_path / "source.contact.usda").read_text().replace("@source", "@./source")
+    (tmp_path / "elsewhere").mkdir()
+    for name in ("source.usda", "source.contact.usda"):  # relative paths: the pair of files can move
+        (tmp_path / name).rename(tmp_path / "elsewhere" / name)
+    assert [item.id for item in UsdHost(tmp_path / "elsewhere" / "source.contact.usda").objects()] == [key]
+
+
+def test_a_stage_that_a_dcc_has_open_keeps_its_layers(tmp_path: Path) -> None:
+    made = UsdHost()
+    made.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
+    made.layer.customLayerData = {}
+    made.save(tmp_path / "scene.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "scene.usda"))
+    root, session_layer = stage.GetRootLayer().ExportToString(), stage.GetSessionLayer()
+    host = UsdHost.on(stage)
+    host.store_document(StoredDocument(b"{}", 4, VERSION))
+    assert stage.GetPrimAtPath("/Contacts").GetAttribute("contact:revision").Get() == 4
+    assert stage.GetRootLayer().ExportToString() == root and not stage.GetRootLayer().dirty
+    assert not session_layer.rootPrims
+    assert host.undo() and host.stored_document() is None
+
+
+def test_three_hundred_steps_of_core_host_and_strangers_agree() -> None:
+    """Core commands, the host's undo and redo, and edits of a script: document, storage and cursor agree."""
+    host, session, key = torus_host()
+    session.close()
+    session = Session(host=host, discover=False)
+    session.meshes["torus"] = host.read_surface(key).mesh
+    rng = np.random.default_rng(7)
+    texts = [host.layer.ExportToString()]
+    at, last = 0, ""
+    for number in range(300):
+        what = rng.choice(["command", "undo", "redo", "stranger"], p=[0.35, 0.3, 0.2, 0.15])
+        if what in ("undo", "redo"):
+            moved = host.undo() if what == "undo" else host.redo()
+            bottom = 4  # steps of torus_host that are older than this list
+            assert moved == ((at > -bottom) if what == "undo" else at + 1 < len(texts)), number
+            at = at - (what == "undo" and moved) + (what == "redo" and moved)
+            if at < 0:
+                assert host.redo()
+                at = 0
+        else:
+            if what == "command":
+                session.rotate("grip (links)", float(rng.uniform(-1, 1)))
+            else:
+                with Usd.EditContext(host.stage, host.layer):
+                    shift = Gf.Matrix4d(1.0).SetTranslate((float(number), 0.0, 0.0))
+                    UsdGeom.Xformable(host.stage.GetPrimAtPath(key)).MakeMatrixXform().Set(shift)
+            at += not what == last == "stranger"  # what strangers do in a row is one step
+            texts[at:] = [host.layer.ExportToString()]
+        last = what
+        stored = host.stored_document()
+        assert stored is not None and stored.revision == session.revision, (number, what)
+        assert same_documents(parse_document(stored.data), session.document), (number, what)
+        assert host.layer.ExportToString() == texts[at], (number, what)
