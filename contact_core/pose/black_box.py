@@ -48,9 +48,14 @@ class BlackBox(Protocol):
     world_length: what distances are judged against, like a manipulator's length; 0 where it is none.
     """
 
-    dofs: Sequence[BlackBoxDof]
-    surface: TriangleMesh
-    world_length: float
+    @property
+    def dofs(self) -> Sequence[BlackBoxDof]: ...
+
+    @property
+    def surface(self) -> TriangleMesh: ...
+
+    @property
+    def world_length(self) -> float: ...
 
     def watch(self, points: SurfacePoints) -> Evaluate:
         """Get ready to evaluate these points, in this order."""

@@ -63,12 +63,10 @@ def _fit_body(
         sources, targets, weights,
         (source_normals, -target_normals, problem.unit) if with_normals else None,
     )  # fmt: skip
-    chart = problem.charts[index]
-    poses = problem.poses(theta)
-    name = problem.bodies[index].name
-    local = poses[name].local.copy()
-    local[joint] = np.linalg.inv(chart.world_from_rig) @ world_move @ chart.world_from_rig @ local[joint]
-    return problem.theta_of({**poses, name: Pose(chart.rig.joints, local)})
+    body, poses = problem.bodies[index], problem.poses(theta)
+    local = poses[body.name].local.copy()
+    local[joint] = np.linalg.inv(body.world_from_rig) @ world_move @ body.world_from_rig @ local[joint]
+    return problem.theta_of({**poses, body.name: Pose(body.rig.joints, local)})
 
 
 def _ends(

@@ -26,7 +26,7 @@ from contact_core.pose.rig import Rig
 
 @dataclass(frozen=True, eq=False)
 class Gram:
-    """What a weighted sum of squares needs of a track: sum_i w_i h_i h_i^T, or the weights where rows are watched."""
+    """What a weighted sum of squares needs of a track: sum_i w_i h_i h_i^T, or, where rows are watched, w."""
 
     matrix: FloatArray
     weights: FloatArray

@@ -67,7 +67,7 @@ def test_it_is_posed_and_its_pose_comes_back() -> None:
     assert box.evaluations < 60 * 2 * len(hidden.start)
     values = dict(zip(hidden.charts[0].dof_names, solution.theta, strict=True))
     pose = solution.poses["tentacle"]
-    assert {name: x for name, x in zip(pose.joints, pose.local[:, 0, 3], strict=True)} == values
+    assert dict(zip(pose.joints, pose.local[:, 0, 3], strict=True)) == values
     assert np.array_equal(hidden.theta_of(solution.poses), solution.theta)
     assert solution.patches["all"].mean < 0.2 * hidden.manipulator_length
 

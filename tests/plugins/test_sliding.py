@@ -1,0 +1,104 @@
+"""Sliding contacts: exact exponential map, exact limits, true gradients, and the complaint they answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contact_builtins.solvers.sliding import SlidingPatch, SlidingTarget, sliding_problem, solve_sliding
+from contact_core.contact.axis import draw_axis
+from contact_core.contact.patch import parameterize_patch, reconstruct_patch
+from contact_core.contact.placement import Root
+from contact_core.contact.shape import PatchShape
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.body import Body, PairedPoints
+from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
+from contact_core.pose.problem import PoseProblem
+from contact_core.testing import meshes, rigs
+from contact_core.testing.term_contract import differences
+
+FLOOR = meshes.plane(16, 2.0)  # normals +z
+STAMP = TriangleMesh(FLOOR.points * [1.0, 1.0, -1.0], FLOOR.faces[:, ::-1])  # normals -z, same triangles
+
+
+def at(mesh: TriangleMesh, points: list[tuple[float, float]]) -> SurfacePoints:
+    return Locator.of(mesh).closest(np.array([(x, y, 0.0) for x, y in points])).points
+
+
+def patch_at(x: float, y: float) -> tuple[PatchShape, Root, SurfacePoints]:
+    """A cross of points with an axis along x, centred at (x, y) on the floor."""
+    axis_shape, axis = draw_axis(FLOOR, at(FLOOR, [(x, y), (x + 0.15, y)]))
+    points = at(FLOOR, [(x + 0.02, y), (x + 0.13, y + 0.03), (x + 0.1, y - 0.11), (x + 0.06, y + 0.12)])
+    shape = PatchShape(axis_shape, parameterize_patch(FLOOR, axis, points), np.ones(4))
+    return shape, axis.root(), points
+
+
+def spread_too_far(movable: bool = True) -> tuple[PoseProblem, list[SlidingPatch]]:
+    """A stiff stamp whose two patches are 0.8 apart, and targets that are 1.0 apart: finger spacing got lost."""
+    contacts, sliding = [], []
+    for name, here, there in (("left", 0.6, 0.5), ("right", 1.4, 1.5)):
+        shape, root, points = patch_at(there, 1.0)
+        mine = at(STAMP, [(x - there + here, y) for x, y, _ in points.positions(FLOOR)])
+        contacts.append(PairedPoints(name, "stamp", mine, "floor", points))
+        sliding.append(SlidingPatch(name, shape, root, slack=0.2, penalty=0.01, mirrored=False))
+    bodies = (Body.rigid("stamp", STAMP, movable=movable), Body.rigid("floor", FLOOR))
+    return PoseProblem(bodies, tuple(contacts)), sliding
+
+
+def test_targets_slide_to_the_spacing_of_the_fingers() -> None:
+    problem, sliding = spread_too_far()
+    fixed = LevenbergMarquardt().solve(problem)
+    slid = solve_sliding(LevenbergMarquardt(), problem, sliding)
+    before = rigs.mean_gap(problem, fixed.theta)
+    after = rigs.mean_gap(slid.solution.problem, slid.solution.theta)
+    assert after < 0.15 * before, (before, after)
+    places = {name: root.point().positions(FLOOR)[0] for name, root in slid.roots.items()}
+    assert places["right"][0] - places["left"][0] == pytest.approx(0.8, abs=0.02)
+
+
+def test_a_slide_is_the_exponential_map() -> None:
+    """Offsets along and across the heading, the heading kept parallel and turned; the points traced from there."""
+    _, (patch, _) = spread_too_far()
+    target = SlidingTarget(FLOOR, patch, np.eye(4), patch_at(0.5, 1.0)[2])
+    root = target.root(np.array([0.5, -0.25, 0.3]))
+    assert root.point().positions(FLOOR)[0] == pytest.approx([0.6, 0.95, 0.0], abs=1e-9)
+    points, normals = target.watch(patch_at(0.5, 1.0)[2])(np.array([0.5, -0.25, 0.3]))
+    turn = 0.3 * patch.turn
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    first = patch_at(0.5, 1.0)[2].positions(FLOOR)[:, :2] - [0.5, 1.0]
+    assert points[:, :2] == pytest.approx([0.6, 0.95] + first @ rotation.T, abs=1e-9)
+    assert normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (4, 1)))
+    traced = reconstruct_patch(FLOOR, patch.shape, root).points.positions(FLOOR)
+    assert points == pytest.approx(traced, abs=1e-12)
+
+
+def test_gradients_of_slides_are_exact() -> None:
+    problem, sliding = spread_too_far()
+    together = sliding_problem(problem, sliding)
+    theta = together.start + np.random.default_rng(0).normal(0.0, 0.05, len(together.start))
+    numeric = differences(together, theta)
+    assert np.abs(together.gradient(together.state(theta)) - numeric).max() <= 1e-6 * np.abs(numeric).max()
+    assert np.abs(numeric[-6:]).max() > 0.0
+
+
+def test_slack_is_kept_exactly() -> None:
+    problem, sliding = spread_too_far(movable=False)
+    tight = [replace(patch, slack=0.03, penalty=0.0) for patch in sliding]
+    slid = solve_sliding(LevenbergMarquardt(), problem, tight)
+    assert np.abs(slid.solution.theta).max() == 1.0
+    for patch, start in zip(tight, (0.5, 1.5), strict=True):
+        moved = slid.roots[patch.contact].point().positions(FLOOR)[0] - [start, 1.0, 0.0]
+        assert np.abs(moved[:2]).max() <= 0.03 + 1e-9
+
+
+def test_refusals() -> None:
+    problem, (patch, other) = spread_too_far()
+    for wrong in (replace(patch, contact="none"), replace(patch, slack=0.0), replace(patch, root=other.root)):
+        with pytest.raises(InvalidInput) as refusal:
+            sliding_problem(problem, [wrong])
+        assert len(str(refusal.value).split()) > 6
