@@ -103,22 +103,22 @@ def generated(asset: Asset, patches: list[Painted], generator: Any) -> dict[str,
 
 
 def lines(mesh: TriangleMesh, axis: SurfacePoints) -> np.ndarray:
-    """(k, 2, 3) segments of an axis, lifted off the skin a little."""
+    """(k, 2, 3) segments of an axis, lifted off the skin so that the patch does not hide them."""
     parts = [exact_geodesic(mesh, axis[k], axis[k + 1]).points for k in range(len(axis) - 1)]
-    ways = [part.positions(mesh) + 3e-4 * part.normals(mesh) for part in parts]
+    ways = [part.positions(mesh) + 2e-3 * part.normals(mesh) for part in parts]
     return np.concatenate([np.stack([way[:-1], way[1:]], 1) for way in ways])
 
 
 def picture(asset: Asset, patches: list[Painted], drawn: dict[str, SurfacePoints], caption: str) -> Picture:
     """The hand from the palm's side: patches, axes by hand in black, generated ones in red with their starts."""
     mesh = asset.mesh
-    dots = np.concatenate([patch.points.positions(mesh) for patch in patches])
+    dots = np.concatenate([patch.points.positions(mesh)[::4] for patch in patches])
     by_hand = np.concatenate([lines(mesh, patch.reference) for patch in patches])
     ours = np.concatenate([lines(mesh, axis) for axis in drawn.values()])
-    starts = np.concatenate([axis[0].positions(mesh) + 6e-4 * axis[0].normals(mesh) for axis in drawn.values()])
+    starts = np.concatenate([axis[0].positions(mesh) + 2.5e-3 * axis[0].normals(mesh) for axis in drawn.values()])
     return Picture(
-        (PictureMesh(mesh, (0.87, 0.76, 0.66)),),
-        points=((dots, (0.35, 0.55, 0.8)), (starts, (0.8, 0.0, 0.0))),
+        (PictureMesh(mesh, (0.5, 0.42, 0.36)),),
+        points=((dots, (0.45, 0.6, 0.85)), (starts, (0.8, 0.0, 0.0))),
         lines=((by_hand, (0.05, 0.05, 0.05)), (ours, (0.85, 0.1, 0.1))),
         camera_from=(0.0, -0.15, 1.0),
         caption=caption,

@@ -38,7 +38,18 @@ def judge(path: Path, *, timeout_s: float = 300.0) -> dict[str, str]:
     mutants = _mutants(path)
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
-        command = [sys.executable, "-m", "pytest", str(path), "-q", "-p", "no:cacheprovider", "-p", "no:randomly"]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            str(path),
+            "-q",
+            "--tb=line",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:randomly",
+        ]
         command += ["-c", str(_empty_settings(folder)), "--rootdir", str(path.parent), "--import-mode=importlib"]
         command += ["--contact-report-file", str(report)]
         run = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
@@ -58,7 +69,10 @@ def _mutants(path: Path) -> dict[str, type[Mutant]]:
     found: dict[str, type[Mutant]] = {
         value.subject: value
         for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Mutant) and issubclass(value, Contract)
+        if isinstance(value, type)
+        and issubclass(value, Mutant)
+        and issubclass(value, Contract)
+        and value.__name__.startswith("Test")  # what pytest collects; the others are bases of mutants
     }
     if not found:
         raise InvalidInput(f"{path.name} holds no class of both Mutant and a Contract.")
