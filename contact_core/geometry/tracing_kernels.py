@@ -102,6 +102,14 @@ def record(
 
 
 @kernel
+def append(f: int, b0: float, b1: float, b2: float, faces: IntArray, barycentric: FloatArray, end: int) -> int:
+    """Append a surface point to buffers that may be full; returns the new end, beyond the buffers if they were."""
+    if end < len(faces):
+        faces[end], barycentric[end, 0], barycentric[end, 1], barycentric[end, 2] = f, b0, b1, b2
+    return end + 1
+
+
+@kernel
 def walk(
     on: int,
     element: int,
@@ -286,12 +294,8 @@ def trace(
         rest = math.hypot(zx, zy)
         hx, hy = (1.0, 0.0) if rest < 1e-290 else (zx / rest, zy / rest)
         if lines:
-            if cursor + 2 > len(line_faces):
-                return NO_ROOM, i, 0
             line_offsets[i] = cursor
-            line_faces[cursor], line_barycentric[cursor, 0] = f, b0
-            line_barycentric[cursor, 1], line_barycentric[cursor, 2] = b1, b2
-            cursor += 1
+            cursor = append(f, b0, b1, b2, line_faces, line_barycentric, cursor)
         leg = offsets[i]
         while True:
             if rest >= 1e-290:
@@ -309,15 +313,24 @@ def trace(
             hx, hy = turned(hx, hy, math.cos(turning_angles[leg]), math.sin(turning_angles[leg]))
             rest = lengths[leg]
             leg += 1
+            if lines:  # where it bends
+                b0, b1, b2 = barycentric[i, 0], barycentric[i, 1], barycentric[i, 2]
+                cursor = append(faces[i], b0, b1, b2, line_faces, line_barycentric, cursor)
         headings[i, 0], headings[i, 1] = hx, hy
         for j in range(leg, offsets[i + 1]):
             rest += lengths[j]
         remaining[i] = rest
         if lines:
-            if cursor >= len(line_faces):
-                return NO_ROOM, i, 0
-            line_faces[cursor], line_barycentric[cursor, 0] = faces[i], barycentric[i, 0]
-            line_barycentric[cursor, 1], line_barycentric[cursor, 2] = barycentric[i, 1], barycentric[i, 2]
-            cursor += 1
+            cursor = append(
+                faces[i],
+                barycentric[i, 0],
+                barycentric[i, 1],
+                barycentric[i, 2],
+                line_faces,
+                line_barycentric,
+                cursor,
+            )
             line_offsets[i + 1] = cursor
+            if cursor > len(line_faces):
+                return NO_ROOM, i, 0
     return DONE, cursor, 0
