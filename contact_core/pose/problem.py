@@ -361,6 +361,30 @@ class PoseProblem:
             for i, chart in enumerate(self.charts)
         )
 
+    def is_still(self, track: Track) -> bool:
+        """Whether no free dof moves what a track carries."""
+        if track.watched is not None:
+            return False
+        key = track.bones.tobytes()
+        if key not in self._moved_bones:
+            self._moved_bones[key] = not self.moves[:, track.bones].any()
+        return self._moved_bones[key]
+
+    def still_vectors(self, track: Track) -> FloatArray:
+        """(k, 3) the vectors of a track that is still, computed once."""
+        if id(track) not in self._still_tracks:
+            self._still_tracks[id(track)] = track, self.start_state.carried(track)
+        return self._still_tracks[id(track)][1]
+
+    @cached_property
+    def _moved_bones(self) -> dict[bytes, bool]:
+        return {}
+
+    @cached_property
+    def _still_tracks(self) -> dict[int, tuple[Track, FloatArray]]:
+        """By identity; the track is kept beside its vectors so that its id stays its own."""
+        return {}
+
     def state(self, theta: FloatArray) -> PoseState:
         """All bodies at theta (d,)."""
         return PoseState(self, theta)

@@ -44,10 +44,16 @@ class PoseState:
 
     def vectors(self, track: Track) -> FloatArray:
         """(k, 3) what a track carries here: points, or normals that are not normalised."""
+        if self.problem.is_still(track):  # and so the same at every theta
+            return self.problem.still_vectors(track)
+        return self.carried(track)
+
+    def carried(self, track: Track) -> FloatArray:
+        """(k, 3) the vectors of a track, computed here, whether or not they move."""
         key = id(track)
         if key not in self._vectors:
             carrier = self._bones if track.width == 4 else self._carriers
-            vectors = track.matrix @ carrier[:, track.columns].T
+            vectors = track.matrix @ carrier[track.columns]
             if track.watched is not None:
                 vectors = vectors + track.watched @ self._watched[track.width]
             self._vectors[key] = track, vectors
@@ -59,6 +65,8 @@ class PoseState:
         The virtual work of the forces: accumulated per bone first, so the cost hardly knows d or k.
         """
         d = len(self.theta)
+        if self.problem.is_still(track):
+            return np.zeros(d)
         per_bone = forces.T @ track.matrix  # (3, width b)
         result = self._derivative(track).reshape(d, -1) @ per_bone.ravel()
         if track.watched is not None:
@@ -110,14 +118,14 @@ class PoseState:
 
     @cached_property
     def _bones(self) -> FloatArray:
-        """(3, 4 j) all bone matrices side by side."""
-        return self.world[:, :3].transpose(1, 0, 2).reshape(3, -1)
+        """(4 j, 3) all bone matrices, transposed, below one another."""
+        return self.world[:, :3].transpose(0, 2, 1).reshape(-1, 3)
 
     @cached_property
     def _carriers(self) -> FloatArray:
-        """(3, 3 j) what carries outward normals, side by side."""
+        """(3 j, 3) what carries outward normals, transposed, below one another."""
         linear = self.world[:, :3, :3] if self.problem.is_rigid else outward_carrier(self.world)
-        return linear.transpose(1, 0, 2).reshape(3, -1)
+        return linear.transpose(0, 2, 1).reshape(-1, 3)
 
     @cached_property
     def _generators(self) -> FloatArray:
@@ -135,7 +143,7 @@ class PoseState:
             else:
                 linear = self._generators[:, :, :3]
                 fields = np.einsum("daa->d", linear)[:, None, None] * np.eye(3) - linear.transpose(0, 2, 1)
-                carrier = self._carriers[:, track.columns]
+                carrier = self._carriers[track.columns].T
             moved = (fields.reshape(3 * d, -1) @ carrier).reshape(d, 3, b, track.width)
             moved *= self.problem.moves[:, None, track.bones, None]
             self._derivatives[key] = moved.reshape(d, 3, -1)

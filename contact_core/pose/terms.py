@@ -154,17 +154,24 @@ class _Normals:
         self.gram = self.sum.gram(self.factors)
 
     def value(self, state: PoseState) -> float:
-        first, second = state.vectors(self.first), state.vectors(self.second)
-        sum_of_units = first / _lengths(first)[:, None] + second / _lengths(second)[:, None]
-        return 0.5 * float(self.factors @ np.einsum("ki,ki->k", sum_of_units, sum_of_units))  # never below 0
+        (u, _), (v, _) = self._units(state)
+        both = u + v
+        return 0.5 * float(self.factors @ np.einsum("ki,ki->k", both, both))  # never below 0, as 1 + u.v is
 
     def gradient(self, state: PoseState) -> FloatArray:
-        first, second = state.vectors(self.first), state.vectors(self.second)
-        a, b = _lengths(first)[:, None], _lengths(second)[:, None]
-        u, v = first / a, second / b
+        (u, a), (v, b) = self._units(state)
         cosine = np.einsum("ki,ki->k", u, v)[:, None]
         w = self.factors[:, None]
         return state.pull(self.first, w * (v - cosine * u) / a) + state.pull(self.second, w * (u - cosine * v) / b)
+
+    def _units(self, state: PoseState) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+        """Unit normals (k, 3) of both ends and their lengths (k, 1) before; found once per state."""
+        kept = state.memory.get(self)
+        if kept is None:
+            ends = [state.vectors(track) for track in (self.first, self.second)]
+            lengths = [_lengths(end)[:, None] for end in ends]
+            kept = state.memory[self] = tuple((e / n, n) for e, n in zip(ends, lengths, strict=True))
+        return kept
 
     def normal_matrix(self, state: PoseState) -> FloatArray:
         return state.quadratic(self.sum, self.gram)
