@@ -9,6 +9,7 @@ from contact_core.geometry.jit import kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
+    ON_NOTHING,
     PI,
     corner_angle,
     corner_at_angle,
@@ -71,12 +72,15 @@ def headings_of_directions(
     angle_sum: FloatArray,
     kind: IntArray,
     headings: FloatArray,
-) -> None:
-    """Write headings (k, 2) of directions (k, 3) at points: see `tangent.direction_to_heading`."""
+) -> int:
+    """Write headings (k, 2) of directions (k, 3) at points: see `tangent.direction_to_heading`. Returns -1, or
+    a halfedge of a face without three corners that a point lies in."""
     for i in range(len(at_faces)):
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
         b = at_barycentric[i]
         on, element, _, _ = place(at_faces[i], b[0], b[1], b[2], tail, twin, shape)
+        if on == ON_NOTHING:
+            return element
         if on == ON_FACE:
             x, y = in_frame(3 * element, dx, dy, dz, points, faces)
         elif on == ON_EDGE:
@@ -105,6 +109,7 @@ def headings_of_directions(
             x, y = math.cos(angle), math.sin(angle)
         length = math.hypot(x, y)
         headings[i, 0], headings[i, 1] = (x / length, y / length) if length > 0.0 else (1.0, 0.0)
+    return -1
 
 
 @kernel
@@ -121,12 +126,15 @@ def directions_of_headings(
     angle_sum: FloatArray,
     kind: IntArray,
     directions: FloatArray,
-) -> None:
-    """Write directions (k, 3) of headings (k, 2) at points: see `tangent.heading_to_direction`."""
+) -> int:
+    """Write directions (k, 3) of headings (k, 2) at points: see `tangent.heading_to_direction`. Returns -1, or
+    a halfedge of a face without three corners that a point lies in."""
     for i in range(len(at_faces)):
         x, y = headings[i, 0], headings[i, 1]
         b = at_barycentric[i]
         on, element, _, _ = place(at_faces[i], b[0], b[1], b[2], tail, twin, shape)
+        if on == ON_NOTHING:
+            return element
         if on == ON_FACE:
             h = 3 * element
         elif on == ON_EDGE:
@@ -140,3 +148,4 @@ def directions_of_headings(
             h, angle = corner_at_angle(element, angle / vertex_scale(element, angle_sum, kind), twin, shape, first)
             x, y = math.cos(angle), math.sin(angle)
         in_space(h, x, y, points, faces, directions[i])
+    return -1

@@ -13,6 +13,7 @@ from contact_core.geometry.jit import constant, kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
+    ON_NOTHING,
     ON_VERTEX,
     PI,
     angle_round_vertex,
@@ -74,13 +75,18 @@ CHECK_EVERY = constant(64)  # pops, at least, between two looks at the targets
 def list_targets(
     faces: IntArray, barycentric: FloatArray, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray,
     listed: FloatArray, target_floats: FloatArray, target_integers: IntArray,
-) -> None:  # fmt: skip
-    """Find the places of targets and hang those inside faces and on edges into the list of a face."""
+) -> int:  # fmt: skip
+    """Find the places of targets and hang those inside faces and on edges into the list of a face.
+
+    Returns -1, or a halfedge of a face without three corners that a target lies in.
+    """
     for t in range(len(faces)):
         b0, b1, b2 = barycentric[t, 0], barycentric[t, 1], barycentric[t, 2]
         on, element, x, y = place(faces[t], b0, b1, b2, tail, twin, shape)
         target_integers[t, ON], target_integers[t, ELEMENT] = on, element
         target_floats[t, RANK] = math.inf
+        if on == ON_NOTHING:
+            return element
         if on == ON_VERTEX:
             continue
         h = 3 * element if on == ON_FACE else element
@@ -95,6 +101,7 @@ def list_targets(
         f = h // 3
         target_integers[t, NEXT] = int(listed[f, 1]) if listed[f, 0] == epoch else -1
         listed[f, 0], listed[f, 1] = epoch, t
+    return -1
 
 
 @kernel
@@ -201,6 +208,8 @@ def light_source(
 ) -> tuple[int, int]:  # fmt: skip
     """Light all faces at source s; returns (status, blocked element)."""
     on, element, x, y = place(f, b0, b1, b2, tail, twin, shape)
+    if on == ON_NOTHING:
+        return MET_BLOCKED_EDGE, element
     if on == ON_VERTEX and kind[element] >= BLOCKED_VERTEX:
         return MET_BLOCKED_VERTEX, element
     if on == ON_EDGE and twin[element] == BLOCKED:
@@ -243,7 +252,11 @@ def search(
     """Spread from the sources until every target within `limit` is final; returns (status, blocked element)."""
     state[:] = 0
     state[FREE] = -1
-    list_targets(target_faces, target_barycentric, epoch, tail, twin, shape, listed, target_floats, target_integers)
+    element = list_targets(
+        target_faces, target_barycentric, epoch, tail, twin, shape, listed, target_floats, target_integers
+    )
+    if element >= 0:
+        return MET_BLOCKED_EDGE, element
     for s in range(len(source_faces)):
         b0, b1, b2 = source_barycentric[s, 0], source_barycentric[s, 1], source_barycentric[s, 2]
         status, element = light_source(

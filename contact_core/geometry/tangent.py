@@ -32,11 +32,13 @@ def direction_to_heading(mesh: TriangleMesh, points: SurfacePoints, directions: 
     topology = Topology.of(mesh)
     require_on_surface(topology, points, "points")
     headings = np.empty(len(points), np.complex128)
-    headings_of_directions(
+    blocked = headings_of_directions(
         mesh.points, mesh.faces, points.faces, points.barycentric, wanted,
         topology.tail, topology.twin, topology.shape, topology.first, topology.angle_sum, topology.kind,
         headings.view(np.float64).reshape(-1, 2),
     )  # fmt: skip
+    if blocked >= 0:
+        raise topology.refuse_halfedge(blocked, "a tangent frame")
     headings.setflags(write=False)
     return headings
 
@@ -52,10 +54,12 @@ def heading_to_direction(mesh: TriangleMesh, points: SurfacePoints, headings: An
     topology = Topology.of(mesh)
     require_on_surface(topology, points, "points")
     directions = np.empty((len(points), 3))
-    directions_of_headings(
+    blocked = directions_of_headings(
         mesh.points, mesh.faces, points.faces, points.barycentric, wanted.view(np.float64).reshape(-1, 2),
         topology.tail, topology.twin, topology.shape, topology.first, topology.angle_sum, topology.kind,
         directions,
     )  # fmt: skip
+    if blocked >= 0:
+        raise topology.refuse_halfedge(blocked, "a tangent frame")
     directions.setflags(write=False)
     return directions

@@ -11,11 +11,12 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, kernel
-from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, following, preceding
+from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, following, has_three_corners, preceding
 
 ON_FACE = constant(0)  # element: face; x, y in the frame of halfedge 3f
 ON_EDGE = constant(1)  # element: the lower-index halfedge; x along it, y = 0
 ON_VERTEX = constant(2)  # element: vertex; x = y = 0
+ON_NOTHING = constant(3)  # in a face without three corners; element: its halfedge 3f
 
 # A point this near to an edge or a vertex, as a fraction of the longest edge of its face, lies on it. A distance,
 # not a barycentric coordinate: in a face a million times longer than high, that would be a million times off.
@@ -37,21 +38,23 @@ def place(
         return ON_VERTEX, tail[h + 1], 0.0, 0.0
     if b0 * l2 + b1 * l1 <= near:
         return ON_VERTEX, tail[h + 2], 0.0, 0.0
-    if b2 * shape[h, 2] <= near:
-        return _on_edge(h, b1 / (b0 + b1), twin, shape)
-    if b0 * shape[h + 1, 2] <= near:
-        return _on_edge(h + 1, b2 / (b1 + b2), twin, shape)
-    if b1 * shape[h + 2, 2] <= near:
-        return _on_edge(h + 2, b0 / (b2 + b0), twin, shape)
+    if not has_three_corners(tail, f):
+        return ON_NOTHING, h, 0.0, 0.0
+    for k in range(3):
+        if b2 * shape[h + k, 2] <= near:  # b0, b1, b2 are the weights at tail, head and apex of this side
+            x = b1 * shape[h + k, 0] + b2 * shape[h + k, 1]
+            if -near <= x <= shape[h + k, 0] + near:
+                return on_edge(h + k, min(max(x, 0.0), shape[h + k, 0]), twin, shape)
+        b0, b1, b2 = b1, b2, b0
     return ON_FACE, f, b1 * l0 + b2 * shape[h, 1], b2 * shape[h, 2]
 
 
 @kernel
-def _on_edge(h: int, t: float, twin: IntArray, shape: FloatArray) -> tuple[int, int, float, float]:
-    """The place at fraction t of halfedge h."""
+def on_edge(h: int, x: float, twin: IntArray, shape: FloatArray) -> tuple[int, int, float, float]:
+    """The place at x along halfedge h."""
     if 0 <= twin[h] < h:
-        return ON_EDGE, twin[h], (1.0 - t) * shape[h, 0], 0.0
-    return ON_EDGE, h, t * shape[h, 0], 0.0
+        return ON_EDGE, twin[h], shape[h, 0] - x, 0.0
+    return ON_EDGE, h, x, 0.0
 
 
 @kernel

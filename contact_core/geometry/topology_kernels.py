@@ -79,7 +79,8 @@ def _home(tail: IntArray, degree: IntArray, h: int) -> int:
 
 
 @kernel
-def _has_three_corners(tail: IntArray, f: int) -> bool:
+def has_three_corners(tail: IntArray, f: int) -> bool:
+    """Whether face f is a triangle, and not a segment or a point."""
     a, b, c = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
     return a != b and b != c and c != a
 
@@ -92,10 +93,10 @@ def pair_halfedges(tail: IntArray, degree: IntArray, head: IntArray, link: IntAr
     head (n,), -1 on entry, and link (3m,) are scratch: lists of halfedges by the home vertex of their edge.
     """
     for h in range(len(tail)):
-        if _has_three_corners(tail, h // 3):
+        if has_three_corners(tail, h // 3):
             degree[tail[h]] += 1
     for h in range(len(tail)):
-        if not _has_three_corners(tail, h // 3):
+        if not has_three_corners(tail, h // 3):
             twin[h] = BLOCKED
             continue
         v = _home(tail, degree, h)
@@ -136,7 +137,7 @@ def order_fans(
     """Write first, angle_sum, kind (n,) and the angles shape[:, 3]; first is -1 and kind UNUSED on entry."""
     for h in range(len(tail)):
         v = tail[h]
-        if not _has_three_corners(tail, h // 3):
+        if not has_three_corners(tail, h // 3):
             continue
         if first[v] < 0 or (twin[h] == BOUNDARY and twin[first[v]] != BOUNDARY):
             first[v] = h

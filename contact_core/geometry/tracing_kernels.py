@@ -14,6 +14,7 @@ from contact_core.geometry.jit import constant, kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
+    ON_NOTHING,
     ON_VERTEX,
     PI,
     SNAP,
@@ -289,6 +290,8 @@ def trace(
         f = start_faces[i]
         b0, b1, b2 = start_barycentric[i, 0], start_barycentric[i, 1], start_barycentric[i, 2]
         on, element, x, y = place(f, b0, b1, b2, tail, twin, shape)
+        if on == ON_NOTHING:
+            return MET_BLOCKED_EDGE, i, element
         faces[i], barycentric[i, 0], barycentric[i, 1], barycentric[i, 2] = f, b0, b1, b2
         zx, zy = first_legs[i, 0], first_legs[i, 1]
         rest = math.hypot(zx, zy)
