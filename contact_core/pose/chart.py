@@ -17,7 +17,7 @@ import numpy as np
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.pose.rig import ROTATION_DOFS, Pose, Rig
-from contact_core.pose.rotations import axis_numbers, cross_matrices, euler_chain, exponential, nearest_rotation
+from contact_core.pose.rotations import axis_numbers, cross_matrices, euler_chain, exponential, nearest_rotations
 
 _AXIS_LETTERS = "xyz"
 
@@ -94,6 +94,7 @@ class Chart:
         rows = np.array(rotvec_rows, np.int64).reshape(-1, 3)
         self._rotvec_dof, self._rotvec_joint, self._rotvec_component = rows.T
         self._rotvec_joints = np.unique(self._rotvec_joint)
+        self._hinges = [j for j, freedom in enumerate(self.rig.freedoms) if freedom.kind == "hinge"]
         self._euler_joints = np.array(euler_joints, np.int64)
         self._euler_dofs = np.array(
             [np.arange(s.start, s.stop) for s in (self.rotation_slices[j] for j in euler_joints)], np.int64
@@ -183,12 +184,16 @@ class Chart:
         local = pose_on(self.rig, pose)
         relative = np.linalg.inv(self.rig.rest_local) @ local
         theta = np.zeros(self.size)
-        for j, freedom in enumerate(self.rig.freedoms):
-            if freedom.translates:
-                theta[self.translation_slices[j]] = relative[j, :3, 3]
-            if freedom.kind != "fixed":
-                inner = freedom.frame.T @ nearest_rotation(relative[j, :3, :3]) @ freedom.frame
-                theta[self.rotation_slices[j]] = _angles(inner, freedom.kind, freedom.order)
+        theta[self._moving_dofs] = relative[self._moving_joints, :3, 3]
+        turned = self.frames.transpose(0, 2, 1) @ nearest_rotations(relative[:, :3, :3]) @ self.frames
+        vectors = np.zeros((len(self.frames), 3))
+        vectors[self._rotvec_joints] = _rotation_vectors(turned[self._rotvec_joints])
+        for j in self._hinges:  # the turn about x that comes nearest
+            r = turned[j]
+            vectors[j, 0] = np.arctan2(r[2, 1] - r[1, 2], r[1, 1] + r[2, 2])
+        theta[self._rotvec_dof] = vectors[self._rotvec_joint, self._rotvec_component]
+        for j, dofs in zip(self._euler_joints, self._euler_dofs, strict=True):
+            theta[dofs] = _euler_angles(turned[j], self.rig.freedoms[j].order)
         leftover = np.linalg.inv(self.turns(theta)[0]) @ relative
         scale = max(1.0, float(np.abs(self.rig.rest_local[:, :3, 3]).max(initial=0.0)))
         plain = np.abs(leftover - np.eye(4)).max(initial=0.0) < 1e-9 * scale
@@ -234,14 +239,17 @@ def _is_rigid(transforms: FloatArray) -> bool:
     return bool(orthogonal and (np.linalg.det(linear) > 0).all())
 
 
-def _angles(rotation: FloatArray, kind: str, order: str) -> FloatArray:
-    """The rotation dofs of one joint that come nearest to a rotation matrix (3, 3)."""
+def _rotation_vectors(rotations: FloatArray) -> FloatArray:
+    """(k, 3) of rotations (k, 3, 3)."""
     from scipy.spatial.transform import Rotation
 
-    if kind == "hinge":  # the turn about x that comes nearest
-        return np.array([np.arctan2(rotation[2, 1] - rotation[1, 2], rotation[1, 1] + rotation[2, 2])])
-    if kind == "ball":
-        return np.asarray(Rotation.from_matrix(rotation).as_rotvec())
-    with warnings.catch_warnings():  # in gimbal lock any split of the two turns is right
+    return np.asarray(Rotation.from_matrix(rotations).as_rotvec()) if len(rotations) else np.zeros((0, 3))
+
+
+def _euler_angles(rotation: FloatArray, order: str) -> FloatArray:
+    """(3,) intrinsic Euler angles of a rotation (3, 3); in gimbal lock any split of the two turns is right."""
+    from scipy.spatial.transform import Rotation
+
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return np.asarray(Rotation.from_matrix(rotation).as_euler(order))

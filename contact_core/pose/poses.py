@@ -14,7 +14,7 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.pose.chart import Chart, pose_on
 from contact_core.pose.rig import Pose, Rig, forward_kinematics
-from contact_core.pose.rotations import exponential, nearest_rotation
+from contact_core.pose.rotations import exponential, nearest_rotations
 
 
 def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:
@@ -153,12 +153,12 @@ class PoseKeys:
 
 def _turn(transform: FloatArray) -> FloatArray:
     """(3, 3) the rotation part of (4, 4)."""
-    return nearest_rotation(transform[:3, :3])
+    return nearest_rotations(transform[None, :3, :3])[0]
 
 
 def _split(local: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotations (j, 3, 3), and the transforms (j, 4, 4) with them taken out of the linear part."""
-    turn = np.array([_turn(one) for one in local]).reshape(-1, 3, 3)
+    turn = nearest_rotations(local[:, :3, :3])
     rest = local.copy()
     rest[:, :3, :3] = turn.transpose(0, 2, 1) @ local[:, :3, :3]
     return turn, rest

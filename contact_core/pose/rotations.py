@@ -63,9 +63,10 @@ def axis_numbers(order: str) -> tuple[int, int, int]:
     return first, second, third
 
 
-def nearest_rotation(matrix: FloatArray) -> FloatArray:
-    """The rotation nearest to a (3, 3) matrix; the identity when its determinant is not positive."""
-    if np.linalg.det(matrix) <= 0.0:
-        return np.eye(3)
-    u, _, vt = np.linalg.svd(matrix)
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+def nearest_rotations(matrices: FloatArray) -> FloatArray:
+    """(k, 3, 3) the rotations nearest to matrices (k, 3, 3); the identity where a determinant is not positive."""
+    u, _, vt = np.linalg.svd(matrices)
+    rotations = u @ vt
+    lost = (np.linalg.det(matrices) <= 0.0) | (np.linalg.det(rotations) <= 0.0)
+    rotations[lost] = np.eye(3)
+    return rotations

@@ -1,0 +1,212 @@
+"""The pose solver: cost of an evaluation, cold and warm solves, and the authors' scheme beside it.
+
+    python benchmarks/bench_pose.py [--quick] [--json FILE] [--placements 50]
+
+All on synthetic problems with a known answer (a 57-dof hand and a mold of it), so that nothing but this
+repository is needed. Medians; set OMP_NUM_THREADS=1 and leave the machine alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from contact_builtins.solvers.nlopt_solver import NLoptSolver
+from contact_builtins.solvers.stepwise import MultiStartSolver
+from contact_core.pose.body import Body, PairedPoints
+from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
+from contact_core.pose.problem import PoseProblem
+from contact_core.pose.rig import Pose
+from contact_core.pose.rotations import exponential
+from contact_core.pose.solver import Iteration, SolveOptions
+from contact_core.pose.threads import one_blas_thread
+from contact_core.testing import rigs
+
+
+def milliseconds(work: Callable[[], object], repeats: int) -> float:
+    """Median time of a call."""
+    work()
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - began)
+    return 1e3 * median(times)
+
+
+def kernels(repeats: int) -> dict[str, float]:
+    """An evaluation at 1000 contact points and 57 dofs."""
+    problem, _ = rigs.planted(rigs.hand_like(), 0, contacts=1000)
+    theta = problem.start + np.random.default_rng(0).normal(0.0, 0.2, len(problem.start))
+
+    def value() -> None:
+        problem.value(problem.state(theta))
+
+    def gradient() -> None:
+        state = problem.state(theta)
+        problem.value(state)
+        problem.gradient(state)
+
+    def model() -> None:
+        state = problem.state(theta)
+        problem.value(state)
+        problem.gradient(state)
+        problem.normal_matrix(state)
+
+    with one_blas_thread():
+        calls = {"value": value, "value and gradient": gradient, "value, gradient and normal matrix": model}
+        return {name: milliseconds(call, repeats) for name, call in calls.items()}
+
+
+def six_patches(seed: int) -> PoseProblem:
+    """500 contacts in six patches: five fingertips and the palm, on a mold of a random pose."""
+    rig = rigs.hand_like(rigs.limited_freedom)
+    whole, _ = rigs.planted(rig, seed, contacts=1)
+    owner = rig.skin_joints[rig.faces[:, 0], 0]
+    random = np.random.default_rng(seed)
+    contacts = []
+    for name in ("wrist", *(f"finger{k}_2" for k in range(5))):
+        faces = random.choice(np.flatnonzero(owner == rig.joint_index(name)), 100 if name == "wrist" else 80)
+        weights = random.dirichlet(np.ones(3), len(faces))
+        ends = rigs.SurfacePoints(faces, weights), rigs.SurfacePoints(faces, weights[:, ::-1])
+        contacts.append(PairedPoints(name, rig.name, ends[0], "mold", ends[1]))
+    return replace(whole, contacts=tuple(contacts))
+
+
+def placed(problem: PoseProblem, seed: int, reach: float = 3.0) -> PoseProblem:
+    """The hand at rest, up to `reach` lengths from the mold and turned up to 180 degrees."""
+    random = np.random.default_rng(1000 + seed)
+    hand = problem.bodies[0]
+    local = hand.rig.rest_local.copy()
+    axis, away = random.normal(size=3), random.normal(size=3)
+    turn = axis / np.linalg.norm(axis) * random.uniform(0.0, np.pi)
+    local[0, :3, :3] = exponential(turn[None])[0][0] @ local[0, :3, :3]
+    centre = problem.bodies[1].rig.surface.points.mean(axis=0)
+    away *= reach * problem.manipulator_length * random.uniform() / np.linalg.norm(away)
+    local[0, :3, 3] = centre + away
+    return replace(problem, bodies=(replace(hand, pose=Pose(hand.rig.joints, local)), *problem.bodies[1:]))
+
+
+def nudged(problem: PoseProblem, seed: int) -> PoseProblem:
+    """One of six patches moved by 1 cm (l) in space: its targets become a body of their own."""
+    random = np.random.default_rng(seed)
+    contact = problem.contacts[int(random.integers(len(problem.contacts)))]
+    shift = np.eye(4)
+    direction = random.normal(size=3)
+    shift[:3, 3] = problem.unit * direction / np.linalg.norm(direction)
+    moved = Body.rigid("moved", problem.bodies[1].rig.surface, world_from_surface=shift)
+    contacts = tuple(replace(c, object="moved") if c is contact else c for c in problem.contacts)
+    return replace(problem, bodies=(*problem.bodies, moved), contacts=contacts)
+
+
+def solves(count: int) -> dict[str, float]:
+    """Cold solves from random placements, and warm ones after a patch moved."""
+    cold, warm, warm_iterations = [], [], []
+    for seed in range(count):
+        solution = LevenbergMarquardt().solve(placed(six_patches(seed), seed))
+        cold.append(solution.seconds)
+        dragged = nudged(solution.problem.at(solution.theta), seed)
+        again = LevenbergMarquardt().solve(dragged, SolveOptions(candidates=("current",), tolerance=1e-4))
+        warm.append(again.seconds)
+        warm_iterations.append(len(again.trace))
+    return {
+        "cold, median ms": 1e3 * median(cold),
+        "warm, median ms": 1e3 * median(warm),
+        "warm, iterations": median(warm_iterations),
+    }
+
+
+class ForwardDifferences(PoseProblem):
+    """The authors' scheme: one whole evaluation per dof and gradient."""
+
+    def gradient(self, state: Any) -> Any:
+        here, step = self.value(state), 1e-6
+        counted.evaluations += len(state.theta)
+        moved = (self.value(self.state(state.theta + step * unit)) for unit in np.eye(len(state.theta)))
+        return np.array([(value - here) / step for value in moved])
+
+
+class counted:  # noqa: N801  (a counter with a name)
+    evaluations = 0
+
+
+def beside_the_authors(count: int, most: int) -> list[dict[str, float]]:
+    """Levenberg-Marquardt, LD_MMA with our gradient, LD_MMA with forward differences: to 1.02x of the optimum."""
+    rows = []
+    for seed in range(count):
+        problem = six_patches(seed)
+        optimum = LevenbergMarquardt().solve(problem).value
+
+        def reached(seen: Iteration, goal: float = 1.02 * optimum) -> bool:
+            return seen.value <= goal
+
+        own = LevenbergMarquardt().solve(problem, None, reached)
+        mma = SolveOptions(
+            max_iterations=most, tolerance=0.0, candidates=("current",), more={"algorithm": "LD_MMA"}
+        )
+        ours = NLoptSolver().solve(problem, mma, reached)
+        fields = {name: getattr(problem, name) for name in PoseProblem.__dataclass_fields__}
+        counted.evaluations = 0
+        authors = NLoptSolver().solve(ForwardDifferences(**fields), mma, reached)
+        rows.append(
+            {
+                "evaluations": own.evaluations,
+                "evaluations, MMA": ours.evaluations,
+                "evaluations, authors": authors.evaluations + counted.evaluations,
+                "ms": 1e3 * own.seconds,
+                "ms, MMA": 1e3 * ours.seconds,
+                "ms, authors": 1e3 * authors.seconds,
+                "reached by MMA": float(ours.value <= 1.02 * optimum),
+                "reached by authors": float(authors.value <= 1.02 * optimum),
+            }
+        )
+    return rows
+
+
+def placements(count: int, starts: int) -> dict[str, float]:
+    """Share of random placements that come within 2% of the best objective known."""
+    problem = six_patches(0)
+    values: dict[str, list[float]] = {"levenberg-marquardt": [], "current only": [], "LD_MMA, 100 evaluations": []}
+    mma = SolveOptions(max_iterations=100, candidates=("current",), more={"algorithm": "LD_MMA"})
+    for seed in range(count):
+        start = placed(problem, seed)
+        values["levenberg-marquardt"].append(LevenbergMarquardt().solve(start).value)
+        values["current only"].append(
+            LevenbergMarquardt().solve(start, SolveOptions(candidates=("current",))).value
+        )
+        values["LD_MMA, 100 evaluations"].append(NLoptSolver().solve(start, mma).value)
+    known = MultiStartSolver().solve(problem, SolveOptions(more={"starts": starts})).value
+    best = min(known, *(min(found) for found in values.values()))
+    return {name: float(np.mean(np.array(found) <= 1.02 * best)) for name, found in values.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer repeats: a smoke test, not a measurement")
+    parser.add_argument("--json", type=Path, help="also write the figures here")
+    parser.add_argument("--placements", type=int, default=50)
+    given = parser.parse_args()
+    few = given.quick
+    began = time.perf_counter()
+    figures: dict[str, Any] = {
+        "one evaluation, ms": kernels(20 if few else 300),
+        "solves, 500 contacts": solves(4 if few else 25),
+        "beside the authors": beside_the_authors(1 if few else 5, 200 if few else 3000),
+        "success": placements(4 if few else given.placements, 8 if few else 200),
+    }
+    figures["seconds"] = time.perf_counter() - began
+    print(json.dumps(figures, indent=2))
+    if given.json:
+        given.json.write_text(json.dumps(figures, indent=2), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
