@@ -109,8 +109,12 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         world = fit_to_scene(asset, self.space(), world_from_surface)
         with self.step(f"Add {asset.name}"), self._editing():
             if asset.rig is None:
-                return export.add_surface(self.stage, asset, world)
-            return export.add_rig(self.stage, asset, asset.rig, world)
+                path = export.add_surface(self.stage, asset, world)
+            else:
+                path = export.add_rig(self.stage, asset, asset.rig, world)
+            if not self.stage.HasDefaultPrim() and self.stage.GetRootLayer() == self.layer:
+                self.stage.SetDefaultPrim(self.stage.GetPrimAtPath(Sdf.Path(path).GetPrefixes()[0]))
+            return path
 
     # Rigs and poses
 

@@ -8,3 +8,8 @@ from contact_core.plugins import hookimpl
 @hookimpl
 def contact_hosts() -> list[object]:
     return ["contact_usd.host:UsdHost"]
+
+
+@hookimpl
+def contact_cli() -> list[object]:
+    return ["contact_usd.command:UsdCommand"]

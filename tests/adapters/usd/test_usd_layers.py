@@ -78,7 +78,6 @@ def test_usds_own_validators_find_no_error_in_our_layer(tmp_path: Path) -> None:
     for frame in (1.0, 2.0):
         host.write_pose(arm, bent(rig, 1), frame)
     contacts.publish(host, session, {"torus": key})
-    host.layer.defaultPrim = "Contacts"
     host.save(tmp_path / "ours.usda")
     stage = Usd.Stage.Open(str(tmp_path / "ours.usda"))
     assert problems(stage) == ()
