@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from contact_core.arrays import FloatArray
 from contact_core.job.scene import moved, posed_skin
 from contact_core.plugins.slots import Picture, PictureMesh
 from contact_core.pose.rig import Pose
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 
 SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 LINES_PER_PATCH = 14
+NEAR = 0.6  # of the length: how much of the object round the contacts is in the frame
 
 Rows = tuple[tuple[str, str, bool], ...]
 
@@ -47,4 +50,11 @@ def _picture(job: Job, pose: Pose, caption: str, rows: Rows) -> Picture:
         up=view.up,
         caption=caption,
         table=rows,
+        focus=_focus(skin.points, thing.points, np.concatenate([line[:, 1] for line, _ in lines]), job.length),
     )
+
+
+def _focus(skin: FloatArray, thing: FloatArray, touched: FloatArray, length: float) -> FloatArray:
+    """(k, 3) the manipulator and the part of the object near the contacts: of a pole, where the hand holds it."""
+    distance, _ = cKDTree(touched).query(thing)
+    return np.concatenate([skin, thing[distance < NEAR * length]])

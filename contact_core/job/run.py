@@ -191,6 +191,7 @@ def place_from(
         patch_points={name: job.session.points(name) for name in names},
         patch_axes={name: job.session.axis(name).points for name in names},
         options=options,
+        solids=job.solids,
     )
     return plugins.get(PLACERS, placer).place(request)
 

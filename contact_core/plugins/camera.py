@@ -11,7 +11,7 @@ from contact_core.arrays import FloatArray
 from contact_core.plugins.slots import Picture
 
 FIELD_OF_VIEW = math.radians(28.0)  # vertical; a long lens, as a product photograph has
-TABLE_WIDTH = 0.3  # of the frame, kept clear for the table
+TABLE_WIDTH = 0.26  # of the frame, kept clear for the table
 _DEFAULT_FROM = (0.55, 0.4, 1.0)
 
 
@@ -28,8 +28,11 @@ class Camera:
 
 
 def camera_of(picture: Picture, aspect: float) -> Camera:
-    """The camera that sees every mesh of a picture in a frame of width / height `aspect`, caption space left."""
-    points = np.concatenate([item.mesh.points[np.unique(item.mesh.faces)] for item in picture.meshes])  # (n, 3)
+    """The camera that sees the picture's focus in a frame of width / height `aspect`, caption space left."""
+    if picture.focus is not None and len(picture.focus):
+        points = np.asarray(picture.focus, float)  # (n, 3)
+    else:
+        points = np.concatenate([item.mesh.points[np.unique(item.mesh.faces)] for item in picture.meshes])
     back = np.asarray(picture.camera_from or _DEFAULT_FROM, float)
     back = back / np.linalg.norm(back)
     right = np.cross(np.asarray(picture.up, float), back)

@@ -65,7 +65,10 @@ class PictureMesh:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """All that a renderer needs, in world space: meshes, coloured points, line segments, camera, caption."""
+    """All that a renderer needs, in world space: meshes, coloured points, line segments, camera, caption.
+
+    focus: (k, 3) what has to be in the frame; all meshes by default.
+    """
 
     meshes: tuple[PictureMesh, ...]
     points: tuple[tuple[FloatArray, tuple[float, float, float]], ...] = ()  # (k, 3) positions, colour
@@ -74,6 +77,7 @@ class Picture:
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     caption: str = ""
     table: tuple[tuple[str, str, bool], ...] = ()  # name, value, failed
+    focus: FloatArray | None = None
 
 
 @runtime_checkable

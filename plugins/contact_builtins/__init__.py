@@ -118,4 +118,7 @@ def contact_commands() -> list[object]:
 
 @hookimpl
 def contact_cli() -> list[object]:
-    return ["contact_builtins.cli.inspect:Inspect"]
+    return [
+        "contact_builtins.cli.inspect:Inspect",
+        "contact_builtins.cli.demo:Demo",
+    ]

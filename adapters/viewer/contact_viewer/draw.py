@@ -69,7 +69,7 @@ def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels
             specular_power=18,
         )  # fmt: skip
     towards_eye = camera.eye - camera.centre
-    lift = 0.004 * towards_eye  # dots show on the surface that carries them
+    lift = 0.0015 * towards_eye  # dots show on the surface that carries them
     for points, color in picture.points:
         if len(points):
             plotter.add_points(

@@ -20,7 +20,8 @@ from contact_core.geometry.surface_point import SurfacePoints
 STEP = np.radians(3.0)
 LAST_RATIO = 0.7  # the last joint of a digit curls more slowly, as tendons make it
 TOUCH = 0.002  # of the bounding box diagonal of the hand: nearer than this is touching
-TURNED, BESIDE = 0.04, 0.008  # hand lengths that a wrong normal of the thumb is worth
+TURNED = 0.04  # hand lengths that a pad of the thumb is worth that looks away from the object
+OPPOSE = 0.008
 FREE_UPPER = np.radians(100.0)  # for joints without limits
 
 
@@ -34,16 +35,15 @@ def approach(hand: HandPose, direction: FloatArray, without: IntArray) -> None:
         raise InvalidInput("the approach leaves out every part of the manipulator; leave some skin to touch with.")
     way = hand.object_from_rig[:3, :3] @ (direction / np.linalg.norm(direction))
     points = hand.points(tested)  # (k, 3)
-    field = hand.field
-    reach = float(
-        np.linalg.norm(np.ptp(points, axis=0)) + np.linalg.norm(np.array(field.values.shape) * field.spacing)
-    )
-    middle = field.origin + 0.5 * field.spacing * (np.array(field.values.shape) - 1)
+    field = hand.fields[0]
+    size = np.array(field.values.shape) * field.spacing
+    reach = float(np.linalg.norm(np.ptp(points, axis=0)) + np.linalg.norm(size))
+    middle = field.origin + 0.5 * size
     ahead = float((middle - points.mean(axis=0)) @ way)  # how far the object lies along the way
     travelled, end = ahead - reach, ahead + reach
     tolerance = 0.1 * field.spacing
     while travelled < end:
-        clear = float(field.sample(points + travelled * way)[0].min())
+        clear = float(hand.distance(points + travelled * way).min())
         if clear < tolerance:
             hand.shift = hand.shift + travelled * (direction / np.linalg.norm(direction))
             return
@@ -79,11 +79,12 @@ def search_thumb(
     digit: Sequence[int] | IntArray,
     pads: Sequence[SurfacePoints],
     others: Sequence[SurfacePoints] = (),
+    oppose: float = OPPOSE,
 ) -> None:
     """Try starts of the thumb's first joint, close each, keep the one whose pads lie best on the object.
 
     pads: points that should touch; the thumb's last link where there are none. others: the pads of the fingers,
-    which a thumb opposes.
+    which a thumb opposes; oppose: how many hand lengths of distance it is worth that it does.
     """
     first, rest = int(digit[0]), list(digit[1:])
     where = hand.chart.rotation_slices[first]
@@ -91,9 +92,9 @@ def search_thumb(
         np.where(np.isfinite(b), b, s * np.pi / 4)
         for b, s in ((hand.chart.lower[where], -1), (hand.chart.upper[where], 1))
     )
-    fractions = [(0.3, 0.7), (0.1, 0.5, 0.9), (0.05, 0.35, 0.65, 0.95)][3 - len(lower) :]  # twist, spread, flexion
+    fractions = [(0.35, 0.65), (0.2, 0.5, 0.8), (0.1, 0.37, 0.63, 0.9)][3 - len(lower) :]  # twist, spread, flexion
     start = hand.theta.copy()
-    against = _mean_normal(hand, others)
+    against = oppose * _mean_normal(hand, others)
     best: tuple[float, FloatArray] | None = None
     for chosen in itertools.product(*fractions):
         hand.theta = start.copy()
@@ -110,7 +111,7 @@ def _misfit(
     hand: HandPose, digit: Sequence[int] | IntArray, pads: Sequence[SurfacePoints], against: FloatArray
 ) -> float:
     """How badly pads lie: mean distance, normals turned away from the object, and to the same side as the fingers'
-    mean normal `against`, skin of the digit that is inside. In lengths of the hand; the factors were found by eye.
+    mean normal (`against`, times its worth), skin of the digit that is inside. In lengths of the hand.
     """
     length = hand.rig.surface.bounding_box_diagonal
     skin = hand.skin()
@@ -121,11 +122,11 @@ def _misfit(
         tip = [joint for joint in digit if len(hand.vertices_of(np.array([joint])))][-1:]
         vertices = hand.vertices_of(np.array(tip))
         points, normals = skin.points[vertices], skin.vertex_normals[vertices]
-    distance, outward = hand.field.sample(points)
+    distance, outward = hand.fields[0].sample(points)
     turned = 1.0 + np.einsum("ki,ki->k", normals, outward).mean()  # 0: the pads look straight at the object
-    beside = 1.0 + float(normals.mean(axis=0) @ against)  # 0: straight against the fingers
-    inside = hand.field.sample(skin.points[hand.vertices_of(np.array(digit))])[0].min(initial=0.0)
-    return float((np.abs(distance).mean() - 2.0 * min(inside, 0.0)) / length + TURNED * turned + BESIDE * beside)
+    beside = float(normals.mean(axis=0) @ against)  # least: straight against the fingers
+    inside = hand.distance(skin.points[hand.vertices_of(np.array(digit))]).min(initial=0.0)
+    return float((np.abs(distance).mean() - 2.0 * min(inside, 0.0)) / length + TURNED * turned + beside)
 
 
 def _mean_normal(hand: HandPose, pads: Sequence[SurfacePoints]) -> FloatArray:

@@ -5,6 +5,7 @@ Settings (recipe table [placer], beside `name`):
   without = ["thumb*"]        joints whose skin the approach does not test
   close = ["index*", ...]     one digit per pattern, curled until it touches
   thumb = "thumb*"            the digit that is searched over starts of its first joint
+  oppose = 0.008              how many lengths of distance it is worth that the thumb opposes the fingers
   far = 0.06                  pads farther away than this, in manipulator lengths, are left out and named
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contact_builtins.placers.closing import approach, close, search_thumb
+from contact_builtins.placers.closing import OPPOSE, approach, close, search_thumb
 from contact_builtins.placers.hand_pose import HandPose, dominant_joint, matching
 from contact_builtins.placers.pads import Pad, pads_of, place_pad
 from contact_core.arrays import IntArray
@@ -38,6 +39,7 @@ class FromPose:
         digits = options.texts("close", ())
         thumb = options.text("thumb", None)
         far = options.number("far", 0.06, above=0.0)
+        oppose = options.number("oppose", OPPOSE, at_least=0.0)
         options.done()
         hand = HandPose(request)
         rig = request.rig
@@ -48,7 +50,7 @@ class FromPose:
         if thumb is not None:
             joints = matching(rig, (thumb,), "placer.thumb")
             mine, others = _pads_on_and_off(request, joints, dominant_joint(rig))
-            search_thumb(hand, joints, mine, others)
+            search_thumb(hand, joints, mine, others, oppose)
         return place_pads(request, hand, far * manipulator_length(rig), facing=FACING)
 
 

@@ -28,7 +28,8 @@ class HandPose:
         self.chart = Chart(request.rig)
         self.theta, self._leftover = self.chart.theta_of(request.pose)
         self.shift: FloatArray = np.zeros(3)
-        self.field = DistanceField.of(request.object_mesh, resolution=resolution)
+        bounds = [request.object_mesh, *(solid for solid in request.solids if solid is not request.object_mesh)]
+        self.fields = tuple(DistanceField.of(mesh, resolution=resolution) for mesh in bounds)
         self.owner = dominant_joint(request.rig)  # (n,)
         rig = self.rig
         homogeneous = np.concatenate([rig.bind_points, np.ones((len(rig.bind_points), 1))], axis=1)  # (n, 4)
@@ -52,7 +53,11 @@ class HandPose:
 
     def clearance(self, vertices: IntArray | None = None) -> FloatArray:
         """(k,) signed distances of skin vertices to the object."""
-        return self.field.sample(self.points(vertices))[0]
+        return self.distance(self.points(vertices))
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """(k,) signed distances of points (k, 3) to the nearest of the object and its solids."""
+        return np.asarray(np.min([field.sample(points)[0] for field in self.fields], axis=0))
 
     def skin(self) -> TriangleMesh:
         """The posed skin in the object's space."""

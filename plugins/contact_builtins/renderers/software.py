@@ -125,7 +125,7 @@ class _Canvas:
         offset = np.stack(np.meshgrid(reach, reach), -1).reshape(-1, 2)
         offset = offset[(offset**2).sum(axis=1) <= radius * radius]  # (o, 2)
         pixels = (projected[:, None, :2].astype(np.int64) + offset).reshape(-1, 2)
-        depth = np.repeat(projected[:, 2], len(offset)) * 0.995
+        depth = np.repeat(projected[:, 2], len(offset)) * 0.9985
         self.fragments(pixels, depth, np.broadcast_to(color, (len(pixels), 3)))
 
     def segments(self, segments: FloatArray, color: FloatArray, radius: int) -> None:
