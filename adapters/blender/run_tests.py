@@ -20,6 +20,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 TESTS = REPOSITORY / "tests" / "adapters" / "blender"
 DEFAULT = "5.0"
 PYTHON_OF = {"4.2": "3.11", "4.5": "3.11", "5.0": "3.11", "5.1": "3.13", "5.2": "3.13"}  # as the wheels are tagged
+PATIENCE = 600  # seconds for one process
 MATRIX = ("4.5", "5.0", "5.2")
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
@@ -56,10 +57,25 @@ def modules() -> list[Path]:
 
 def run(python: Path, tests: list[str], *options: str, **variables: str) -> subprocess.CompletedProcess[str]:
     """One pytest process in a Blender environment."""
-    command = [str(python), "-m", "pytest", "-p", "no:cacheprovider", "-q", *options, *tests]
-    return subprocess.run(
-        command, cwd=REPOSITORY, env={**os.environ, **ONE_CORE, **variables}, capture_output=True, text=True
-    )
+    command = ["-m", "pytest", "-p", "no:cacheprovider", "-q", *options, *tests]
+    return _started(python, command, variables)
+
+
+def run_script(python: Path, script: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """One script in a Blender environment."""
+    return _started(python, [str(script), *arguments], {})
+
+
+def _started(python: Path, command: list[str], variables: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    """Run to the end, or for PATIENCE; a Blender that hangs is a failure that says so."""
+    environ = {**os.environ, **ONE_CORE, **variables}
+    try:
+        return subprocess.run(
+            [str(python), *command], cwd=REPOSITORY, env=environ, capture_output=True, text=True, timeout=PATIENCE
+        )
+    except subprocess.TimeoutExpired as late:
+        said = late.stdout.decode() if isinstance(late.stdout, bytes) else late.stdout or ""
+        return subprocess.CompletedProcess(command, 1, said, f"Blender did not end within {PATIENCE} seconds.")
 
 
 @contextlib.contextmanager

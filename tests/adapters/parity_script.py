@@ -48,11 +48,14 @@ class Outcome:
 
 
 def prepared(asset: Asset) -> Asset:
-    """A rig as it goes to every host: in meters, in single precision, its joints free."""
+    """A rig as it goes to every host: in meters, in single precision, its joints free, bound in its rest pose.
+
+    Skinning from another bind pose would let the weights, which each host rounds in its own way, into the surface.
+    """
     rig = asset.rig
     assert rig is not None
-    points = rig.bind_points.astype(np.float32)
-    rig = replace(rig, bind_points=points, meters_per_unit=1.0, up_axis="Y", name="hand")
+    points = rig.surface.points.astype(np.float32)
+    rig = replace(rig, bind_points=points, bind_world=rig.rest_world, meters_per_unit=1.0, up_axis="Y", name="hand")
     return Asset("hand", rig.surface, rig, meters_per_unit=1.0)
 
 

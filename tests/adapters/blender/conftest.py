@@ -55,6 +55,19 @@ if IN_BLENDER:
             with Path(os.environ[REPORTS]).open("a") as stream:
                 stream.write(json.dumps(report._to_json(), default=str) + "\n")
 
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+        session.config.stash[_STATUS] = int(exitstatus)
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_unconfigure(config: pytest.Config) -> None:
+        """Leave without Blender's own end: as a module it now and then hangs there (seen in 4.5)."""
+        if _STATUS in config.stash:
+            sys.stdout.flush(), sys.stderr.flush()
+            os._exit(config.stash[_STATUS])
+
+    _STATUS = pytest.StashKey[int]()
+
 else:
     _reports: dict[Path, dict[str, list[pytest.TestReport]]] = {}
 

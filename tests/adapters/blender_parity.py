@@ -1,0 +1,78 @@
+"""The part of the parity test that runs in a Blender process: `python blender_parity.py FOLDER`.
+
+FOLDER/jobs.json names rigs: {"name": {"joint": ..., "blend": ..., "object": ...}}. A rig of a .blend is read here,
+in its native host, and put away as FOLDER/name.rig; any other lies there already. Then the script runs on each in
+Blender, and its outcome is FOLDER/name.npz.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from parity_script import Outcome, build_scene, prepared, run
+
+from contact_core.document.asset import Asset
+from contact_core.memory_host import MemoryHost
+
+
+def put_away(asset: Asset, path: Path) -> None:
+    """A rig as a file that any process reads: a memory scene with that rig."""
+    host = MemoryHost()
+    host.add(asset)
+    host.save(path)
+
+
+def fetch(path: Path) -> Asset:
+    """The rig of such a file."""
+    host = MemoryHost(path)
+    (item,) = host.objects()
+    return host.read_rig(item.id)
+
+
+def outcome_to_arrays(outcome: Outcome) -> dict[str, Any]:
+    """For np.savez: poses as names and matrices."""
+    arrays: dict[str, Any] = {}
+    for field in fields(outcome):
+        value = getattr(outcome, field.name)
+        if isinstance(value, dict):
+            arrays[f"{field.name} names"] = np.array(list(value))
+            value = np.array(list(value.values()))
+        arrays[field.name] = value
+    return arrays
+
+
+def outcome_from_arrays(arrays: Any) -> Outcome:
+    """The inverse."""
+    values: dict[str, Any] = {}
+    for field in fields(Outcome):
+        value = arrays[field.name]
+        if f"{field.name} names" in arrays:
+            value = dict(zip(arrays[f"{field.name} names"].tolist(), value, strict=True))
+        elif field.name != "skin":
+            value = tuple(value.tolist()) if value.ndim else value.item()
+        values[field.name] = value
+    return Outcome(**values)
+
+
+def main(folder: Path) -> None:
+    from contact_blender.host import BlenderHost, bpy
+
+    for name, job in json.loads((folder / "jobs.json").read_text()).items():
+        if "blend" in job:
+            put_away(prepared(BlenderHost(job["blend"]).read_rig(job["object"])), folder / f"{name}.rig")
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        host = BlenderHost()
+        build_scene(host, fetch(folder / f"{name}.rig"), job["joint"])
+        np.savez(folder / name, **outcome_to_arrays(run(host, job["joint"], folder / f"{name}.blend")))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
