@@ -26,6 +26,7 @@ from contact_core.edit.verbs.rebinding import RebindReport, plan_rebind
 from contact_core.errors import CommandRejected, FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.bones import bones_of
 from contact_core.pose.rig import Rig, forward_kinematics, skin
 
 if TYPE_CHECKING:
@@ -419,7 +420,9 @@ class Session(Verbs):
             for other in self.document.patches.values()
             if other.surface == surface and other.name != patch and other.original
         }
-        return AxisRequest(self.mesh(surface), points, other_axes=others)
+        rig = self.rigs.get(surface)
+        bones, owner = bones_of(rig, points) if rig is not None else (None, None)
+        return AxisRequest(self.mesh(surface), points, bones, owner, others)
 
     # -- inside --------------------------------------------------------------------------------------------------
 

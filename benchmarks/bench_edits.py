@@ -1,0 +1,182 @@
+"""Edits end to end through the session, journal on: command, history, journal, reconstruction, notification.
+
+    python benchmarks/bench_edits.py [--bunny FILE]
+
+Without the bunny scan, a subdivided bumpy sphere of like size stands in, and the table says so. Every row holds the
+median and the bar of the design; the bars are for an idle machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from contact_core.edit.commands import Rotate
+from contact_core.edit.history import History
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.session import Session
+from contact_core.testing import meshes
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--bunny", type=Path, default=default_bunny())
+    parser.add_argument("--copies", type=int, default=64)
+    arguments = parser.parse_args()
+    mesh, name = scan(arguments.bunny)
+    print(f"{name}: {len(mesh.faces)} faces, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    print(f"{'row':46s} {'median':>10s} {'least':>10s} {'bar':>10s}")
+    single = edits(mesh, "")
+    many = edits(meshes.copies(mesh, arguments.copies, 0.0), f", {arguments.copies} copies")
+    for key in ("translate", "rotate", "bend"):
+        print(
+            f"{key + f', {arguments.copies} copies / one':46s} {many[key] / single[key]:9.2f}x {'':10s} {1.5:9.2f}x"
+        )
+    tree(mesh)
+    history_memory()
+    return 0
+
+
+def edits(mesh: TriangleMesh, note: str) -> dict[str, float]:
+    """Rows for one patch of 500 points; answers medians in seconds."""
+    medians: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder, Session.open(Path(folder) / "d.json", discover=False) as session:
+        session.add_surface("scan", mesh)
+        points = disk(mesh, 500, 0.05)
+        session.paint("p", points, surface="scan", axis=points[ends(points, mesh)])
+        session.listen(lambda change: session.points("p") and None)
+        steps = nearby(points, mesh, 60)
+        bars = {"translate": 2e-3, "rotate": 2e-3, "bend": 2e-3}
+        actions: dict[str, Callable[[int], object]] = {
+            "translate": lambda k: session.translate("p", steps[k]),
+            "rotate": lambda k: session.rotate("p", 0.05),
+            "bend": lambda k: session.bend("p", 3, 0.02),
+        }
+        for key, action in actions.items():
+            medians[key] = row(f"{key}, 500 points{note}", action, bars[key])
+        row(f"undo{note}", lambda k: session.undo(), 1e-4, warm=0)
+        row(f"redo{note}", lambda k: session.redo(), 1e-4, warm=0)
+
+        def transfer(k: int) -> None:
+            copy = session.transfer("p", "scan", steps[k], heading=1j)
+            session.points(copy)
+
+        row(f"transfer, 500 points{note}", transfer, 2e-3)
+        session.close(discard=True)
+    return medians
+
+
+def tree(mesh: TriangleMesh) -> None:
+    """A tree of ten patches of 300 points, turned by its root."""
+    with tempfile.TemporaryDirectory() as folder, Session.open(Path(folder) / "d.json", discover=False) as session:
+        session.add_surface("scan", mesh)
+        names = [f"p{k}" for k in range(10)]
+        for k, name in enumerate(names):
+            points = disk(mesh, 300, 0.03, seed=k)
+            session.paint(name, points, surface="scan", axis=points[ends(points, mesh)])
+            if k:
+                session.link(name, names[(k - 1) // 2])
+
+        def turn(k: int) -> None:
+            session.rotate("p0", 0.05)
+            for name in names:
+                session.points(name)
+
+        row("rotate a tree of 10 patches of 300 points", turn, 10e-3)
+        session.close(discard=True)
+
+
+def history_memory() -> None:
+    """Memory of 10,000 edits over 30 patches."""
+    from contact_core.testing.random_commands import random_command, random_history
+
+    rng = np.random.default_rng(0)
+    history = random_history(0, 0)
+    while len(history.document.patches) < 30:
+        command = random_command(history.document, rng, "contact.paint")
+        assert command is not None
+        history.do(command)
+    history = History(history.document)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    while len(history.steps) < 10_000:
+        command = random_command(history.document, rng, "contact.rotate")
+        assert isinstance(command, Rotate)
+        history.do(command)
+    used = (tracemalloc.get_traced_memory()[0] - before) / 1e6
+    tracemalloc.stop()
+    print(f"{'10,000 edits on 30 patches':46s} {used:7.1f} MB {'':10s} {50.0:7.1f} MB")
+
+
+def row(title: str, action: Callable[[int], object], bar: float, *, count: int = 40, warm: int = 3) -> float:
+    """Time an action, print its row, answer the median in seconds."""
+    taken = []
+    for k in range(count):
+        start = time.perf_counter()
+        action(k)
+        taken.append(time.perf_counter() - start)
+    kept = taken[warm:]
+    median = float(np.median(kept))
+    print(f"{title:46s} {1e3 * median:7.3f} ms {1e3 * min(kept):7.3f} ms {1e3 * bar:7.3f} ms")
+    return median
+
+
+def disk(mesh: TriangleMesh, count: int, reach: float, seed: int = 0) -> SurfacePoints:
+    """Random points in faces within `reach` (of one copy's bounding box) of the seed-th place on the first copy.
+
+    Places follow one another outwards from the first, up to about a fifth of the bounding box.
+    """
+    size = min(len(mesh.faces), 69_451)
+    centres = mesh.points[mesh.faces[:size]].mean(axis=1)
+    extent = float(np.linalg.norm(np.ptp(centres, axis=0)))
+    random = np.random.default_rng(seed)
+    outwards = np.argsort(np.linalg.norm(centres - centres[20_000 % size], axis=1))
+    centre = centres[outwards[(size // 120) * seed]]
+    near = np.flatnonzero(np.linalg.norm(centres - centre, axis=1) < reach * extent)
+    return SurfacePoints(random.choice(near, count), random.dirichlet(np.ones(3), count))
+
+
+def nearby(points: SurfacePoints, mesh: TriangleMesh, count: int) -> list[SurfacePoints]:
+    """Single points in an order that steps a little further each time, as a drag does."""
+    where = points.positions(mesh)
+    order = np.argsort(np.linalg.norm(where - where[0], axis=1))
+    return [points[int(k)] for k in order[1 : count + 1]]
+
+
+def ends(points: SurfacePoints, mesh: TriangleMesh) -> list[int]:
+    """The farthest pair, near enough: an axis."""
+    where = points.positions(mesh)
+    first = int(np.argmax(np.linalg.norm(where - where.mean(axis=0), axis=1)))
+    return [first, int(np.argmax(np.linalg.norm(where - where[first], axis=1)))]
+
+
+def default_bunny() -> Path:
+    """Where the shared assets keep the scan."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "assets"
+    return Path(os.environ.get("CONTACT_ASSETS", beside)) / "objects" / "stanford_bunny_35k.obj"
+
+
+def scan(path: Path) -> tuple[TriangleMesh, str]:
+    """The bunny, or a stand-in of about as many faces."""
+    if not path.exists():
+        return meshes.noisy(6, 0.02), "a bumpy sphere (no bunny here)"
+    points, faces = [], []
+    for line in path.read_text().splitlines():
+        if line.startswith("v "):
+            points.append([float(x) for x in line.split()[1:4]])
+        elif line.startswith("f "):
+            faces.append([int(x.split("/")[0]) - 1 for x in line.split()[1:4]])
+    return TriangleMesh(points, faces), path.stem
+
+
+if __name__ == "__main__":
+    sys.exit(main())
