@@ -13,9 +13,12 @@ import pytest
 
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.host import SceneSpace
 from contact_core.pose.chart import Chart
 from contact_core.pose.rig import JointFreedom, Pose, forward_kinematics, skin
+from contact_core.pose.solver import SolveOptions
 from contact_core.testing.host_scenes import HostScene, SceneRig, affine, arm_rig, bent
 from contact_core.testing.rigs import any_freedom, hand_like
 
@@ -299,3 +302,33 @@ def test_a_real_hand_with_weights_far_from_one(bpy: Any, scenes: Any, assets: Pa
         assert asset.details["linear skinning is exact"], (key, asset.notes, asset.details)
         assert worst_difference(host, key, 2) < 1e-5
     assert most == 7 and "2.15" in sums and "0.88" in sums
+
+
+def test_what_skinning_cannot_do_is_solved_through_blender(bpy: Any, arm: Any) -> None:
+    """With preserved volume: contacts of a planted pose are met as Blender evaluates them, and better than by our
+    skinning; the scene is as it was."""
+    import blender_scenes
+
+    from contact_blender.black_box import EvaluatedRig
+    from contact_core.pose.body import Body, PairedPoints
+    from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
+    from contact_core.pose.problem import PoseProblem
+
+    preserve_volume(bpy, bpy.data.objects["arm"])
+    black_box = EvaluatedRig(arm, "arm")
+    rig, place = black_box.chart.rig, arm.placement("arm")
+    planted = Pose(rig.joints, np.concatenate([rig.rest_local[:1], bent(rig, 2).local[1:]]))
+    moved = rig.surface.with_points(arm.skin_points("arm", planted) @ place[:3, :3].T + place[:3, 3])
+    points = SurfacePoints(np.arange(20, 60), np.full((40, 3), 1 / 3))
+    target = TriangleMesh(moved.points, moved.faces[:, ::-1])  # it faces the skin
+    contacts = PairedPoints("skin", "arm", points, "target", points, np.full(40, 1 / 40))
+    before = blender_scenes.whole_state()
+    gaps = []
+    for body in (Body.evaluated("arm", black_box), Body.skinned(rig, name="arm", world_from_rig=place)):
+        problem = PoseProblem(bodies=(body, Body.rigid("target", target)), contacts=(contacts,), prior="current")
+        solved = LevenbergMarquardt().solve(problem, SolveOptions(candidates=("current",))).poses["arm"]
+        pose = black_box.pose(solved) if body.black_box is not None else solved
+        skinned = rig.surface.with_points(arm.skin_points("arm", pose) @ place[:3, :3].T + place[:3, 3])
+        gaps.append(np.linalg.norm(points.positions(skinned) - points.positions(moved), axis=1).mean())
+    assert blender_scenes.whole_state() == before
+    assert gaps[0] < 0.01 * rig.surface.bounding_box_diagonal and gaps[0] < 0.5 * gaps[1], gaps
