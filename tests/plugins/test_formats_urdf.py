@@ -9,7 +9,9 @@ from contact_builtins.formats.urdf import UrdfFiles
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
 from contact_core.geometry.report import report
+from contact_core.plugins.slots import Format
 from contact_core.pose.rig import Rig, forward_kinematics, skin
+from contact_core.testing.format_contract import FormatContract
 
 BOX = '<visual><geometry><box size="0.2 0.2 0.2"/></geometry></visual>'
 PARTS = f"""
@@ -86,6 +88,20 @@ def test_a_hinge_moves_its_links_rigidly(tmp_path: Path) -> None:
 def test_bad_robots_are_refused(tmp_path: Path, inside: str, words: str) -> None:
     with pytest.raises(FileRefused, match=words):
         read(tmp_path, inside)
+
+
+class TestUrdf(FormatContract):
+    cannot = {"writing": "URDF holds no pose; a .glb is what is written", "rigs": "reads rigs, but writes none"}
+
+    @pytest.fixture
+    def file_format(self) -> Format:
+        return UrdfFiles()
+
+    @pytest.fixture
+    def example(self, tmp_path: Path) -> Path:
+        path = tmp_path / "two.urdf"
+        path.write_text(f'<robot name="r">{PARTS}</robot>')
+        return path
 
 
 @pytest.mark.assets

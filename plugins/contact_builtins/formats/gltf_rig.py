@@ -192,7 +192,9 @@ def _parents(
 
 
 def _sorted_parents_first(parents: IntArray) -> list[int]:
-    """Joints ordered so that parents come first, otherwise as they were. Raises InvalidInput on a ring."""
+    """Joints ordered so that parents come first; as they were when they do. Raises InvalidInput on a ring."""
+    if (parents < np.arange(len(parents))).all():
+        return list(range(len(parents)))
     order, done = list[int](), set[int]([-1])
     waiting = list(range(len(parents)))
     while waiting:

@@ -29,9 +29,7 @@ class GeneratedSample:
     def build(self) -> Asset:
         """The asset, out of the cache or made now (seconds)."""
         try:
-            return unpack(
-                cached_arrays("samples", f"{self.name}-{generator_version()}", lambda: pack(self.generate()))
-            )
+            return unpack(cached_arrays("samples", f"{self.name}-{self.version()}", lambda: pack(self.generate())))
         except InvalidInput:  # the cache holds something else under this name: it costs time, nothing more
             return self.generate()
 
@@ -41,19 +39,18 @@ class GeneratedSample:
         make: Callable[[], Asset] = getattr(import_module(f"{PACKAGE}.{module}"), function)
         return make()
 
+    def version(self) -> str:
+        """Digest of the sources that make this sample: a changed generator never meets an old cache.
 
-def generator_version() -> str:
-    """Digest of this package's sources: a changed generator never meets an old cache."""
-    state = hashlib.sha256()
-    for source in sorted(files(PACKAGE).iterdir(), key=lambda entry: entry.name):
-        if source.name.endswith(".py"):
-            state.update(source.read_bytes())
-    return state.hexdigest()[:16]
-
-
-def sample(name: str) -> GeneratedSample:
-    """A built-in sample by name."""
-    return next(s for s in ALL if s.name == name)
+        All of this package but the modules of other samples, and this catalogue.
+        """
+        others = {sample.builder.split(":")[0] for sample in ALL} - {self.builder.split(":")[0]}
+        state = hashlib.sha256()
+        for source in sorted(files(PACKAGE).iterdir(), key=lambda entry: entry.name):
+            module, _, ending = source.name.partition(".")
+            if ending == "py" and module not in others and module != "catalogue":
+                state.update(source.read_bytes())
+        return state.hexdigest()[:16]
 
 
 HUMAN_HAND = GeneratedSample(

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from contact_builtins.samples.fields import Field, box, chain, cylinder, round_cone, union
-from contact_builtins.samples.modelling import from_manifold, surface_of
+from contact_builtins.samples.modelling import surface_of
+from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
-from contact_core.errors import MissingExtra
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.triangulate import triangulate
+from contact_core.geometry.weld import weld
 
 
 def pole() -> Asset:
@@ -25,12 +28,27 @@ def chair() -> Asset:
 
 def floor() -> Asset:
     """A floor slab of 3 m by 3 m, 10 cm thick, its upper side at y = 0."""
-    try:
-        from manifold3d import Manifold
-    except ImportError as error:
-        raise MissingExtra("Building a sample", "samples") from error
-    slab = Manifold.cube((3.0, 0.1, 3.0), True).translate((0.0, -0.05, 0.0)).refine_to_length(0.1)
-    return Asset(name="floor", mesh=from_manifold(slab), meters_per_unit=1.0, up_axis="Y")
+    mesh = grid_box(np.array([3.0, 0.1, 3.0]), np.array([0.0, -0.05, 0.0]), 0.1)
+    return Asset(name="floor", mesh=mesh, meters_per_unit=1.0, up_axis="Y")
+
+
+def grid_box(size: FloatArray, centre: FloatArray, cell: float) -> TriangleMesh:
+    """A closed box of square cells about `cell` wide, each cut in two."""
+    counts = np.maximum(np.round(size / cell).astype(int), 1)
+    corners = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        i, j = (grid.ravel() for grid in np.meshgrid(np.arange(counts[u]), np.arange(counts[v])))
+        for side in (0, 1):
+            steps = ((0, 0), (1, 0), (1, 1), (0, 1)) if side else ((0, 0), (0, 1), (1, 1), (1, 0))
+            quads = np.empty((len(i), 4, 3), int)  # lattice coordinates
+            for k, (du, dv) in enumerate(steps):
+                quads[:, k, axis], quads[:, k, u], quads[:, k, v] = side * counts[axis], i + du, j + dv
+            corners.append(quads)
+    lattice = np.concatenate(corners).reshape(-1, 3)
+    points, index = weld(lattice / counts - 0.5, tolerance=0.0)
+    triangles, _, _ = triangulate(np.full(len(lattice) // 4, 4), index, points)
+    return TriangleMesh(points * size + centre, triangles)
 
 
 def _chair() -> Field:

@@ -48,12 +48,12 @@ THUMB, THUMB_END = (0.478, 0.935, 0.048), (0.500, 0.852, 0.108)
 # Frames: x along the bone, y to the side that closes, z = x cross y the flexion axis. Degrees are anatomical
 # averages: twist, spread, flexion.
 LINKS = (
-    Link("hips", "", (0, 0.95, 0), (0, 1.06, 0), (0, 0, 1), root(), 0.13),
+    Link("hips", "", (0, 0.95, 0), (0, 1.06, 0), (0, 0, 1), root(), 0.12),
     Link("spine_1", "hips", (0, 1.06, 0), (0, 1.18, -0.005), (0, 0, 1), limits(15, 15, -15, 30), 0.12),
-    Link("spine_2", "spine_1", (0, 1.18, -0.005), (0, 1.31, -0.02), (0, 0, 1), limits(15, 15, -15, 30), 0.13),
-    Link("chest", "spine_2", (0, 1.31, -0.02), (0, 1.47, -0.03), (0, 0, 1), limits(15, 15, -15, 25), 0.14),
-    Link("neck", "chest", (0, 1.47, -0.03), (0, 1.565, -0.005), (0, 0, 1), limits(40, 30, -35, 35), 0.06),
-    Link("head", "neck", (0, 1.565, -0.005), (0, 1.74, 0.005), (0, 0, 1), limits(40, 20, -30, 30), 0.09),
+    Link("spine_2", "spine_1", (0, 1.18, -0.005), (0, 1.31, -0.02), (0, 0, 1), limits(15, 15, -15, 30), 0.12),
+    Link("chest", "spine_2", (0, 1.31, -0.02), (0, 1.47, -0.03), (0, 0, 1), limits(15, 15, -15, 25), 0.12),
+    Link("neck", "chest", (0, 1.47, -0.03), (0, 1.565, -0.005), (0, 0, 1), limits(40, 30, -35, 35), 0.12),
+    Link("head", "neck", (0, 1.565, -0.005), (0, 1.74, 0.005), (0, 0, 1), limits(40, 20, -30, 30), 0.12),
     Link("clavicle_l", "chest", (0.025, 1.44, -0.005), SHOULDER, (0, 0, 1), limits(10, 25, -15, 25), 0.05),
     Link("upperarm_l", "clavicle_l", SHOULDER, ELBOW, (0.1, 0, 1), limits(90, 90, -60, 150), 0.05),
     Link("lowerarm_l", "upperarm_l", ELBOW, WRIST, (-0.35, 0, 1), limits(85, 5, -2, 150), 0.04),
@@ -74,7 +74,9 @@ def build() -> Asset:
     links = [*LINKS, *(_mirrored(link) for link in LINKS if link.name.endswith("_l"))]
     bones = [Bone(k.name, k.parent, k.at, np.subtract(k.to, k.at), k.palmar, k.freedom) for k in links]
     segments: list[Segment] = [(k.name, np.array(k.at), np.array(k.to), k.thick) for k in links]
-    weights = bone_heat_weights(mesh, *heat_sources(mesh.points, bones, segments), len(bones), 0.6)
+    owner, distance = heat_sources(mesh.points, bones, segments)
+    # the trunk is thick: heat as far as its bones are from the skin would smear arms over the belly
+    weights = bone_heat_weights(mesh, owner, np.minimum(distance, 0.05), len(bones))
     rig = rig_of("human_body", bones, mesh, *strongest(weights, 8))
     return Asset(name=rig.name, mesh=rig.surface, rig=rig, meters_per_unit=1.0, up_axis="Y")
 
@@ -191,11 +193,12 @@ def _leg() -> Field:
         by(BALL, -0.03, -0.001, 0.005),
         0.026,
     )
-    toes = slab(
-        by(BALL, 0.026, -0.004, 0),
-        by(BALL, -0.03, -0.004, 0),
-        by(TOE, -0.016, -0.003, 0),
-        0.0215,
+    outer, inner = (
+        slab(by(BALL, 0.026, -0.003, 0), by(BALL, -0.03, -0.003, 0), by(TOE, x, -0.002, z), 0.0215)
+        for x, z in _TOES
     )
-    foot = union([heel, instep, sole, toes], 0.025)
+    foot = union([heel, instep, sole, outer, inner], 0.02)
     return union([union([thigh, patella, shin, calf], 0.035), foot], 0.025)
+
+
+_TOES = ((-0.024, 0.006), (0.016, -0.02))  # where big and little toe end, from the middle of the toes
