@@ -2,7 +2,9 @@
 
 FOLDER/jobs.json names rigs: {"name": {"joint": ..., "blend": ..., "object": ...}}. A rig of a .blend is read here,
 in its native host, and put away as FOLDER/name.rig; any other lies there already. Then the script runs on each in
-Blender, and its outcome is FOLDER/name.npz.
+Blender, and its outcome is FOLDER/name.npz; the scene, exported by Blender's own exporter, is FOLDER/name.usdc.
+A stage FOLDER/shot.usda, if there, is imported by Blender's own importer, and FOLDER/imported.npz tells how its rig
+stands at the script's frame.
 """
 
 from __future__ import annotations
@@ -17,10 +19,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from parity_script import Outcome, build_scene, prepared, run
+from parity_script import FRAME, Outcome, build_scene, prepared, run
 
 from contact_core.document.asset import Asset
 from contact_core.memory_host import MemoryHost
+from contact_core.pose.rig import forward_kinematics, skin
 
 
 def put_away(asset: Asset, path: Path) -> None:
@@ -72,6 +75,31 @@ def main(folder: Path) -> None:
         host = BlenderHost()
         build_scene(host, fetch(folder / f"{name}.rig"), job["joint"])
         np.savez(folder / name, **outcome_to_arrays(run(host, job["joint"], folder / f"{name}.blend")))
+        bpy.context.scene.frame_start, bpy.context.scene.frame_end = int(FRAME), int(FRAME)
+        bpy.ops.wm.usd_export(filepath=str(folder / f"{name}.usdc"), export_animation=True)
+    if (folder / "shot.usda").is_file():
+        np.savez(folder / "imported", **imported(folder / "shot.usda"))
+
+
+def imported(stage: Path) -> dict[str, Any]:
+    """World points of the rig of a stage at the script's frame: as we skin its animation, and as Blender does."""
+    from contact_blender.host import BlenderHost, bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.usd_import(filepath=str(stage))
+    host = BlenderHost()
+    (key,) = [item.id for item in host.objects() if item.kind == "rig"]
+    rig, place = host.read_rig(key).rig, host.placement(key, FRAME)
+    ours = skin(rig, forward_kinematics(rig.parents, host.read_pose(key, FRAME).local))
+    bpy.context.scene.frame_set(int(FRAME))
+    evaluated = bpy.data.objects[key].evaluated_get(bpy.context.evaluated_depsgraph_get())
+    theirs = np.array([tuple(evaluated.matrix_world @ vertex.co) for vertex in evaluated.data.vertices])
+    return {
+        "ours": ours @ place[:3, :3].T + place[:3, 3],
+        "theirs": theirs,
+        "keys": np.array(host.pose_keys(key)),
+        "joints": np.array(rig.joints),
+    }
 
 
 if __name__ == "__main__":

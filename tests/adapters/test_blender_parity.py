@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from contact_core.memory_host import MemoryHost
+from contact_core.scene_reading import turn_up
 
 HERE = Path(__file__).parent
 JOINTS = {  # joint whose patch goes to the ball, and where the rig comes from
@@ -70,6 +71,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory, assets: Path) -> Path:
     for name in ("human", "webxr", "figure"):
         blender_parity.put_away(parity.prepared(_read_natively(name, assets)), folder / f"{name}.rig")
     (folder / "jobs.json").write_text(json.dumps(jobs))
+    for host, suffix in _usd_hosts():
+        parity.build_scene(host, blender_parity.fetch(folder / "human.rig"), JOINTS["human"])
+        shot = parity.run(host, JOINTS["human"], folder / f"shot{suffix}")
+        np.savez(folder / "shot", **blender_parity.outcome_to_arrays(shot))
     done = run_tests.run_script(python, HERE / "blender_parity.py", str(folder))
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
     return folder
@@ -80,7 +85,8 @@ def test_one_script_gives_one_result_in_blender_too(name: str, folder: Path, tmp
     with np.load(folder / f"{name}.npz") as arrays:
         theirs = blender_parity.outcome_from_arrays(arrays)
     hand = blender_parity.fetch(folder / f"{name}.rig")
-    for host, suffix in [(MemoryHost(), ".contactscene"), *_usd_hosts(name)]:
+    # USD beside memory for the rig that only Blender reads; the others meet USD in test_parity.
+    for host, suffix in [(MemoryHost(), ".contactscene"), *(_usd_hosts() if name == "godot" else [])]:
         parity.build_scene(host, hand, JOINTS[name])
         ours = parity.run(host, JOINTS[name], tmp_path / f"scene{suffix}")
         before, after = ours.gap
@@ -89,9 +95,35 @@ def test_one_script_gives_one_result_in_blender_too(name: str, folder: Path, tmp
         assert {key: value for key, value in found.items() if value > parity.LIMITS[key]} == {}, (suffix, found)
 
 
-def _usd_hosts(name: str) -> list[tuple[Any, str]]:
-    """USD beside memory for the rig that only Blender reads; the others meet USD in test_parity."""
-    if name != "godot" or importlib.util.find_spec("pxr") is None:
+def test_a_posed_usd_shot_opens_in_blender_with_its_animation(folder: Path) -> None:
+    """What the USD host wrote, by Blender's own importer: the key is at its frame, and the skin is where it was."""
+    if not (folder / "shot.usda").is_file():
+        pytest.skip("usd-core is not installed")
+    with np.load(folder / "shot.npz") as arrays:
+        shot = blender_parity.outcome_from_arrays(arrays)
+    with np.load(folder / "imported.npz") as imported:
+        assert set(imported["joints"].tolist()) == set(shot.pose)
+        assert imported["keys"].tolist() == list(shot.keys) == [parity.FRAME]
+        wanted = shot.skin @ turn_up("Y", "Z")[:3, :3].T  # the stage's up is y, the scene's z
+        for skin in (imported["ours"], imported["theirs"]):
+            assert np.abs(skin - wanted).max() < 1e-4 * shot.length
+
+
+@pytest.mark.parametrize("name", ["human", "godot"])
+def test_what_blender_exports_opens_as_a_usd_host(name: str, folder: Path) -> None:
+    """The posed scene by Blender's own exporter: the USD host finds the rig, its pose at the frame, and the skin."""
+    usd = pytest.importorskip("contact_usd.host", reason="usd-core is not installed", exc_type=ImportError)
+    with np.load(folder / f"{name}.npz") as arrays:
+        posed = blender_parity.outcome_from_arrays(arrays)
+    host = usd.UsdHost(folder / f"{name}.usdc")
+    (key,) = [item.id for item in host.objects() if item.kind == "rig"]
+    place = host.placement(key)
+    skin = host.skin_points(key, host.read_pose(key, parity.FRAME)) @ place[:3, :3].T + place[:3, 3]
+    assert np.abs(skin - posed.skin).max() < 1e-5 * posed.length  # the script stands the rig at the origin
+
+
+def _usd_hosts() -> list[tuple[Any, str]]:
+    if importlib.util.find_spec("pxr") is None:
         return []
     from contact_usd.host import UsdHost
 
