@@ -83,6 +83,7 @@ def test_a_hinge_moves_its_links_rigidly(tmp_path: Path) -> None:
         (PARTS.replace('xyz="0 3 0"', 'xyz="0 0 0"'), "no axis"),
         (PARTS.replace('lower="0.4"', 'lower="2.4"'), "limits from"),
         ("<link", "cannot be parsed"),
+        ('<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/hostname">]><link name="a"/>', "document type"),
     ],
 )
 def test_bad_robots_are_refused(tmp_path: Path, inside: str, words: str) -> None:

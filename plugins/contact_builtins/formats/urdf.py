@@ -61,7 +61,8 @@ def _parse(path: Path) -> Any:
         import yourdfpy
     except ImportError as error:
         raise MissingExtra("Reading URDF", "io") from error
-    file_bytes(path)  # missing, too large or unreadable: said in our words
+    if b"<!DOCTYPE" in file_bytes(path) or b"<!ENTITY" in file_bytes(path):  # no entities: they name other files
+        raise FileRefused(f"{path} declares a document type, which no URDF needs and which is not read. Remove it.")
     try:
         return yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False).robot
     except Exception as error:  # yourdfpy and lxml raise whatever they meet
