@@ -13,3 +13,8 @@ def contact_hosts() -> list[object]:
 @hookimpl
 def contact_cli() -> list[object]:
     return ["contact_usd.command:UsdCommand"]
+
+
+@hookimpl
+def contact_formats() -> list[object]:
+    return ["contact_usd.files:UsdFiles"]

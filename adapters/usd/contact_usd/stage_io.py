@@ -119,10 +119,17 @@ def refusing(path: Path) -> Iterator[None]:
         yield
     except ContactError:
         raise
-    except (Tf.ErrorException, RuntimeError, AttributeError) as error:
-        reason = str(error).strip().splitlines()
-        detail = reason[-1].strip() if reason else type(error).__name__
-        raise FileRefused(f"{path} cannot be used as a USD layer: {detail}") from error
+    except (Tf.ErrorException, RuntimeError, AttributeError, UnicodeDecodeError) as error:
+        raise FileRefused(f"{path} cannot be used as a USD layer: {_reason(error)}") from error
+
+
+def _reason(error: Exception) -> str:
+    """The last line of USD's message; a damaged file may be quoted in it, bytes and all."""
+    try:
+        lines = str(error).strip().splitlines()
+    except UnicodeDecodeError:
+        lines = []
+    return lines[-1].strip() if lines else "it is damaged."
 
 
 def _open_ours(path: Path) -> OwnedStage:

@@ -129,6 +129,7 @@ def test_a_new_process_reads_it_with_and_without_the_schema(plugin: str, tmp_pat
 
 def test_schema_files_are_what_usd_generates(repository: Path) -> None:
     pytest.importorskip("jinja2", reason="usdGenSchema needs jinja2")
+    pytest.importorskip("pxr.UsdValidation", reason="the committed files are those of usd-core 26.3 and later")
     generator = repository / "adapters" / "usd" / "generate_schema.py"
     spec = importlib.util.spec_from_file_location("generate_schema", generator)
     assert spec is not None and spec.loader is not None

@@ -1,0 +1,98 @@
+"""USD as a file format: one rig, or all surfaces of a stage as one mesh, for recipes and `contact inspect`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contact_core.document.asset import Asset
+from contact_core.errors import FileRefused, InvalidInput, MissingExtra
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.pose.rig import Pose
+
+if TYPE_CHECKING:
+    from contact_usd.host import UsdHost
+
+
+class UsdFiles:
+    """Reads any stage; writes text and binary layers. pxr is imported when a file is read or written."""
+
+    name = "usd"
+    suffixes = (".usda", ".usdc", ".usd", ".usdz")
+    can_read = True
+    can_write = True
+
+    def read(self, path: Path, *, sidecar: Path | None = None) -> Asset:
+        """The one rig of a stage, else its surfaces as one mesh in the world. Raises FileRefused, MissingExtra."""
+        host = _host(path)
+        if sidecar is not None:
+            raise FileRefused(
+                f"{path} keeps its joint limits on the skeleton (contact:jointFreedoms), so the rig sidecar"
+                f" {sidecar} has no place. Leave it out."
+            )
+        items = host.objects()
+        rigs = [item.id for item in items if item.kind == "rig"]
+        try:
+            if len(rigs) == 1:
+                return host.read_rig(rigs[0])
+            if rigs or not items:
+                found = f"{len(rigs)} rigs ({', '.join(rigs[:6])})" if rigs else "no meshes"
+                raise FileRefused(
+                    f"{path} has {found}; as a file it is read where it has one rig, or meshes alone."
+                )
+            return _one_mesh(host, path, [item.id for item in items])
+        except InvalidInput as error:
+            raise FileRefused(f"{path} cannot be read: {error}") from error
+
+    def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
+        """A new stage with every asset, rigs in their pose by a SkelAnimation. Raises FileRefused, MissingExtra."""
+        if not Path(path).absolute().parent.is_dir():
+            raise FileRefused(f"{path} cannot be written: there is no folder {Path(path).parent}. Make it first.")
+        units = {asset.meters_per_unit for asset in assets if asset.meters_per_unit is not None}
+        host = _host(None, meters_per_unit=min(units, default=1.0), up_axis=assets[0].up_axis if assets else "Y")
+        for asset in assets:
+            key = host.add(asset)
+            if asset.rig is not None and asset.name in poses:
+                host.write_pose(key, poses[asset.name])
+        host.save(Path(path))
+
+
+def _host(path: Path | None, meters_per_unit: float = 1.0, up_axis: str = "Y") -> UsdHost:
+    try:
+        from contact_usd.host import UsdHost
+    except ImportError as error:
+        raise MissingExtra("Reading and writing USD", "usd") from error
+    from contact_core.host import SceneSpace
+
+    if path is not None:
+        return UsdHost(path)
+    return UsdHost(space=SceneSpace(meters_per_unit, up_axis))  # type: ignore[arg-type]
+
+
+def _one_mesh(host: UsdHost, path: Path, ids: list[str]) -> Asset:
+    """All surfaces where they stand, one below the other; the maps go to the stage's own points and faces."""
+    parts = [host.read_surface(key) for key in ids]
+    places = [host.placement(key) for key in ids]
+    placed = [p.mesh.points @ m[:3, :3].T + m[:3, 3] for p, m in zip(parts, places, strict=True)]
+    starts = np.cumsum([0, *(len(points) for points in placed)])[:-1]
+    space = host.space()
+    sources = [np.asarray(part.source_vertices) + start for part, start in zip(parts, starts, strict=True)]
+    return Asset(
+        name=Path(path).stem,
+        mesh=TriangleMesh(
+            np.concatenate(placed),
+            np.concatenate([part.mesh.faces + start for part, start in zip(parts, starts, strict=True)]),
+        ),
+        source_vertices=np.concatenate(sources),
+        source_faces=parts[0].source_faces if len(parts) == 1 else None,
+        meters_per_unit=space.meters_per_unit,
+        up_axis=space.up_axis,
+        notes=(
+            *space.notes,
+            *(f"{key}: {note}" for key, part in zip(ids, parts, strict=True) for note in part.notes),
+        ),
+        details={"format": "usd", "prims": ids},
+    )
