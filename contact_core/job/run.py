@@ -117,14 +117,18 @@ def run(
     progress: JobProgress | None = None,
 ) -> JobResult:
     """Run a recipe and write document, pose, posed model, pictures and report into `out`."""
-    with Session(discover=plugins is None) as session:
-        job = Job(recipe, session, progress)
-        offered = plugins or session.plugins
-        _read(job, offered)
-        _paint(job, offered)
-        _place(job, offered)
-        _solve(job, offered)
-        return write_outputs(job, Path(out), offered)
+    plugins = plugins or PluginManager()
+    return write_outputs(perform(recipe, plugins, progress=progress), Path(out), plugins)
+
+
+def perform(recipe: Recipe, plugins: PluginManager, *, progress: JobProgress | None = None) -> Job:
+    """All of a job but its files: read, paint, place, solve, measure. Raises ContactError."""
+    job = Job(recipe, Session(discover=False), progress)
+    _read(job, plugins)
+    _paint(job, plugins)
+    _place(job, plugins)
+    _solve(job, plugins)
+    return job
 
 
 def _read(job: Job, plugins: PluginManager) -> None:
