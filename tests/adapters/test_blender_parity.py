@@ -111,7 +111,7 @@ def test_a_posed_usd_shot_opens_in_blender_with_its_animation(folder: Path) -> N
 
 @pytest.mark.parametrize("name", ["human", "godot"])
 def test_what_blender_exports_opens_as_a_usd_host(name: str, folder: Path) -> None:
-    """The posed scene by Blender's own exporter: the USD host finds the rig, its pose at the frame, and the skin."""
+    """The posed scene by Blender's own exporter: the USD host finds its rig, pose and skin."""
     usd = pytest.importorskip("contact_usd.host", reason="usd-core is not installed", exc_type=ImportError)
     with np.load(folder / f"{name}.npz") as arrays:
         posed = blender_parity.outcome_from_arrays(arrays)

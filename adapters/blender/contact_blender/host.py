@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.placement import Placement, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.host import (
+    Display,
     DocumentStorage,
     PoseWriting,
     Progress,
@@ -34,8 +35,12 @@ from contact_core.host import (
     StoredDocument,
     Undo,
 )
+from contact_core.plugins.slots import Picture
 from contact_core.pose.rig import Pose
 from contact_core.scene_reading import fit_to_scene, stretch_pose, stretch_rig, surface_of_polygons, unstretch_pose
+
+if TYPE_CHECKING:
+    from contact_blender.overlay import Overlay
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +53,7 @@ class _KnownRig:
 
 
 class BlenderHost(
-    SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStorage, Undo, SelectionReading, Progress
+    SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStorage, Undo, SelectionReading, Display, Progress
 ):
     """The scene of Blender's window, or of the bpy module. Ids are the names under which objects were first seen.
 
@@ -68,6 +73,7 @@ class BlenderHost(
             _open_file(Path(path))
         self._ids = ObjectIds()
         self._undo = UndoBridge()
+        self._overlay: Overlay | None = None
         self._known: dict[str, _KnownRig] = {}
         storage.restore_ids(bpy.context.scene, self._ids)
 
@@ -195,7 +201,7 @@ class BlenderHost(
     def on_undo(self, listener: Callable[[], None]) -> Callable[[], None]:
         return self._undo.on_undo(listener)
 
-    # Selections and progress
+    # Selections, display and progress
 
     def selections(self, object_id: str) -> tuple[str, ...]:
         return selection.names(self._mesh_object(object_id))
@@ -209,6 +215,14 @@ class BlenderHost(
             )
         reached = np.unique(asset.source_vertices[chosen])
         return SurfacePoints.at_vertices(asset.mesh, reached[reached >= 0])
+
+    def show(self, picture: Picture | None) -> None:
+        """Over every 3D view; without a window it waits for one."""
+        if self._overlay is None:
+            from contact_blender.overlay import Overlay  # Blender's gpu module, which a batch job never needs
+
+            self._overlay = Overlay()
+        self._overlay.show(picture)
 
     def progress(self, fraction: float, text: str) -> bool:
         """Blender's progress cursor. A cancel key is heard only by a modal operator, so this never says so."""
