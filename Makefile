@@ -13,7 +13,7 @@ READY := $(VENV)/.ready
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test lint typecheck pytest wheel matrix bench docs clean
+.PHONY: help demo test lint typecheck pytest wheel matrix bench docs contract-report clean
 
 help:
 	@echo "make demo | test | lint | bench | docs | clean"
@@ -52,3 +52,9 @@ bench: $(READY)
 
 clean:
 	rm -rf $(VENV) .venvs $(OUT) build dist site .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir site
+
+contract-report: $(READY)
+	$(BIN)/pytest -q --collect-only -p no:xdist tests/contract tests/adapters tests/plugins --contact-report-file docs/contract-report.md > /dev/null

@@ -1,0 +1,134 @@
+"""The documentation cannot drift: its code runs, its hooks are the code's, its tables are compared."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from contact_core.edit.command import registered_commands, unregister_command
+from contact_core.plugins import hookspecs
+from contact_core.plugins.registry import SLOTS
+from contact_core.testing import SUITES
+from contact_core.testing.contract import Contract, clause_table
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+HOOKS = [name for name in vars(hookspecs) if name.startswith("contact_")]
+TITLES = {"pose_solvers": "pose-solvers", "cli": "sub-commands"}
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return [code for found, code in BLOCK.findall(page.read_text(encoding="utf-8")) if found == language]
+
+
+WITH_CODE = [page for page in PAGES if blocks(page, "python")]
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_code_of_every_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of a page run one after the other, as a reader would type them."""
+    monkeypatch.chdir(tmp_path)
+    module = ModuleType("page")
+    monkeypatch.setitem(sys.modules, "page", module)
+    known = set(registered_commands())
+    for number, code in enumerate(blocks(page, "python"), start=1):
+        exec(compile(code, f"{page.name}, block {number}", "exec"), module.__dict__)
+    for added in set(registered_commands()) - known:  # the laws of commands are tested over all that are known
+        unregister_command(added)
+
+
+def test_every_hook_is_documented_with_its_signature() -> None:
+    text = (ROOT / "docs" / "plugins" / "hooks.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (\w+)$", text, re.MULTILINE) == HOOKS
+    for name in HOOKS:
+        function = getattr(hookspecs, name)
+        assert f"\n{name}{inspect.signature(function)}\n" in text, name
+        assert (function.__doc__ or "").strip() in text, name
+
+
+def test_every_slot_has_a_page_with_a_complete_example() -> None:
+    assert {slot.hook for slot in SLOTS} == {name for name in HOOKS if "choose" not in name} - {
+        "contact_document_changed",
+        "contact_pose_solved",
+    }
+    for slot in SLOTS:
+        name = slot.hook.removeprefix("contact_")
+        page = ROOT / "docs" / "plugins" / f"{TITLES.get(name, name.replace('_', '-'))}.md"
+        code = "\n".join(blocks(page, "python"))
+        assert "@hookimpl" in code and slot.hook in code, page.name
+        assert "assert " in code, page.name
+
+
+def test_a_generator_takes_less_than_thirty_lines() -> None:
+    (code,) = blocks(ROOT / "docs" / "plugins" / "axis-generators.md", "python")
+    body = code[code.index("class FromTheMiddle") : code.index("class TestFromTheMiddle")]
+    assert len([line for line in body.splitlines() if line.strip()]) < 30
+
+
+def test_the_page_on_generators_is_a_plugin_that_keeps_the_contract(tmp_path: Path) -> None:
+    """Step by step, as a new author: the page's code in a file, and pytest over it."""
+    (code,) = blocks(ROOT / "docs" / "plugins" / "axis-generators.md", "python")
+    tmp_path.joinpath("test_mine.py").write_text(code, encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--contact-report-file", "r.json"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stdout[-2000:]
+    assert json.loads((tmp_path / "r.json").read_text())["broken"] == {"FromTheMiddle": []}
+
+
+def suite(name: str) -> type[Contract]:
+    module = import_module(f"contact_core.testing.{name}_contract")
+    found = getattr(module, "".join(word.title() for word in name.split("_")) + "Contract")
+    assert issubclass(found, Contract)
+    return found
+
+
+@pytest.mark.parametrize("name", SUITES)
+def test_the_clauses_stand_in_the_adapters_readme(name: str) -> None:
+    assert clause_table(suite(name)) in (ROOT / "adapters" / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_contract_report_is_the_suites(tmp_path: Path) -> None:
+    """docs/contract-report.md says what a collection of the contract tests says; that they hold is what CI runs."""
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "--collect-only", "-p", "no:xdist", "-p", "no:cacheprovider",
+         "tests/contract", "tests/adapters", "tests/plugins", "--contact-report-file", str(tmp_path / "report.md")],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stdout[-2000:]
+    told = (ROOT / "docs" / "contract-report.md").read_text(encoding="utf-8")
+    assert told == (tmp_path / "report.md").read_text(encoding="utf-8"), "run `make contract-report`"
+
+
+def test_the_site_builds_without_warnings(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("material")
+    run = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")],
+        cwd=ROOT, capture_output=True, text=True, check=False, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+    )  # fmt: skip
+    assert run.returncode == 0 and "WARNING" not in run.stderr, run.stderr[-3000:]
+    assert (tmp_path / "site" / "index.html").exists()
+
+
+def test_no_committed_file_names_a_registry() -> None:
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode:
+        pytest.skip("not a git checkout")
+    words = ("index-" + "url", "--extra-" + "index", "pypi." + "org/simple", "/opt/" + "pypi")
+    for name in filter(None, listed.stdout.split("\0")):
+        path = ROOT / name
+        if path.suffix not in (".png", ".npz") and path.is_file():
+            text = path.read_text(encoding="utf-8", errors="ignore")
+            assert not [word for word in words if word in text], name
