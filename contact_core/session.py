@@ -6,28 +6,20 @@ import contextlib
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
-from contact_core.document.document import ContactDocument, Surface
-from contact_core.document.lock import DocumentLock
+from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro, register_command
-from contact_core.edit.commands import AddSurface, RebindSurface
 from contact_core.edit.derived import Derived
 from contact_core.edit.history import History, Step
-from contact_core.edit.journal import Journal
-from contact_core.edit.recovery import journal_path, open_file, write_document
+from contact_core.edit.open_document import OpenDocument
+from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
-from contact_core.edit.verbs import Verbs
-from contact_core.edit.verbs.rebinding import RebindReport, plan_rebind
-from contact_core.errors import CommandRejected, FileRefused, InvalidInput
-from contact_core.geometry.mesh import TriangleMesh
+from contact_core.edit.verbs import SurfaceVerbs, Verbs
+from contact_core.errors import CommandRejected, FileRefused
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.bones import bones_of
-from contact_core.pose.rig import Rig, forward_kinematics, skin
 
 if TYPE_CHECKING:
     from contact_core.host_link import HostLink
@@ -54,7 +46,7 @@ class DocumentChanged:
 Listener = Callable[[DocumentChanged], None]
 
 
-class Session(Verbs):
+class Session(Verbs, SurfaceVerbs):
     """Edits one document.
 
     document: to start from, empty by default. plugins: modules or objects with hook implementations, of highest
@@ -72,15 +64,11 @@ class Session(Verbs):
         discover: bool = True,
     ) -> None:
         self.history = History(document or ContactDocument())
-        self._meshes: dict[str, TriangleMesh] = {}  # by digest
-        self.rigs: dict[str, Rig] = {}
-        self.notes: tuple[str, ...] = ()
-        self.path: Path | None = None
-        self.read_only = False
-        self._derived = Derived(self._meshes)
+        self.known_meshes = {}
+        self.rigs = {}
+        self._derived = Derived(self.known_meshes)
         self._listeners: list[Listener] = []
-        self._journal: Journal | None = None
-        self._lock: DocumentLock | None = None
+        self._file: OpenDocument | None = None
         self._macro: list[Command] | None = None
         self._macro_document: ContactDocument | None = None
         self._in_stroke = False
@@ -107,11 +95,23 @@ class Session(Verbs):
         session = cls(**arguments)
         if journal_path(Path(path)).exists():
             session.register_commands()  # a journal may hold commands of plugins
-        opened = open_file(Path(path))
-        session.path, session.history = opened.path, opened.history
-        session._journal, session._lock = opened.journal, opened.lock
-        session.notes, session.read_only = opened.notes, opened.lock is None
+        session._file, session.history = OpenDocument.open(Path(path))
         return session
+
+    @property
+    def path(self) -> Path | None:
+        """The document file, None before the first save."""
+        return self._file.path if self._file is not None else None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what opening the file found."""
+        return self._file.notes if self._file is not None else ()
+
+    @property
+    def read_only(self) -> bool:
+        """Whether someone else has the document, so that nothing can be committed here."""
+        return self._file is not None and self._file.read_only
 
     def save(self, path: Path | str | None = None) -> Path:
         """Write the document file, whole or not at all. With a new path the session goes on there.
@@ -121,133 +121,30 @@ class Session(Verbs):
         target = Path(path) if path is not None else self.path
         if target is None:
             raise FileRefused("this document has no file yet: save it with a path.")
-        if target == self.path and not self.read_only:
-            digest = write_document(target, self.document)
-            if self._journal is not None:
-                self._journal.saved(self.revision, digest)
+        if self._file is not None and target == self.path and not self.read_only:
+            self._file.save(self.history)
         else:
-            self._save_elsewhere(target)
+            opened = OpenDocument.create(target, self.history)
+            if self._file is not None:
+                self._file.close(in_order=True)
+            self._file = opened
         self.history.mark_clean()
         return target
-
-    def _save_elsewhere(self, target: Path) -> None:
-        lock = DocumentLock.take(target)
-        if isinstance(lock, str):
-            raise FileRefused(f"cannot save there: {lock}")
-        try:
-            digest = write_document(target, self.document)
-            journal = Journal.start(journal_path(target), self.history, digest)
-        except BaseException:
-            lock.release()
-            raise
-        self._let_go()
-        self.path, self._journal, self._lock, self.read_only = target, journal, lock, False
 
     def close(self, *, discard: bool = False) -> None:
         """End in order and let go of lock and host. Edits that were not saved stay in the journal, and the next
         opening brings them back, unless `discard` says that they are not wanted."""
-        self._let_go(discard or self.history.is_clean)
+        if self._file is not None:
+            self._file.close(in_order=discard or self.history.is_clean)
         if self._host_link is not None:
             self._host_link.close()
             self._host_link = None
-
-    def _let_go(self, in_order: bool = True) -> None:
-        if self._journal is not None:
-            self._journal.close(record=in_order)
-            self._journal = None
-        if self._lock is not None:
-            self._lock.release()
-            self._lock = None
 
     def __enter__(self) -> Session:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    # -- surfaces ------------------------------------------------------------------------------------------------
-
-    def add_surface(
-        self,
-        name: str,
-        mesh: TriangleMesh,
-        *,
-        meters_per_unit: float = 1.0,
-        up_axis: Literal["X", "Y", "Z"] = "Y",
-        rig: Rig | None = None,
-        world_from_surface: Any = None,
-    ) -> Surface:
-        """Give the session the mesh of a surface; a name new to the document is added to it.
-
-        A known name with the same content only brings the mesh. The same topology in another shape is bound
-        silently. Another topology raises InvalidInput: `rebind` projects the contacts onto it.
-        """
-        known = self.document.surfaces.get(name)
-        wanted = Surface(
-            name,
-            mesh.digest,
-            mesh.topology_digest,
-            len(mesh.points),
-            len(mesh.faces),
-            meters_per_unit,
-            up_axis,
-            None if rig is None else rig.name,
-            np.eye(4) if world_from_surface is None else world_from_surface,
-        )
-        if known is not None and known.topology_digest != wanted.topology_digest:
-            raise InvalidInput(
-                f"{name!r} is another mesh now ({known.points} points and {known.faces} faces before,"
-                f" {wanted.points} and {wanted.faces} now): use rebind to project its contacts onto the new one."
-            )
-        if known is None:
-            self.do(AddSurface(wanted), origin="asset")
-        elif known.digest != wanted.digest:
-            moved = replace(known, digest=wanted.digest)
-            self.do(RebindSurface(moved, self.document.shapes.without(*self.document.shapes), ()), origin="asset")
-        self._meshes[mesh.digest] = mesh
-        if rig is not None:
-            self.rigs[name] = rig
-        return self.document.surface(name)
-
-    def rebind(self, name: str, mesh: TriangleMesh, *, old_mesh: TriangleMesh | None = None) -> RebindReport:
-        """Put the contacts of a surface onto another mesh under the same name, and say how far they moved.
-
-        The old mesh has to be known: added to this session before, or given. Undo goes back to it.
-        """
-        known = self.document.surface(name)
-        if old_mesh is not None:
-            if old_mesh.digest != known.digest:
-                raise InvalidInput(f"the old mesh of {name!r} is not the one that its contacts were painted on.")
-            self._meshes[old_mesh.digest] = old_mesh
-        changed = replace(
-            known,
-            digest=mesh.digest,
-            topology_digest=mesh.topology_digest,
-            points=len(mesh.points),
-            faces=len(mesh.faces),
-        )
-        command, report = plan_rebind(self, changed, mesh)
-        self._meshes[mesh.digest] = mesh
-        self.do(command)
-        return report
-
-    def posed_mesh(self, surface: str) -> TriangleMesh:
-        """The surface in the pose that the document holds; at rest without one."""
-        pose, rig = self.document.poses.get(surface), self.rigs.get(surface)
-        if pose is None:
-            return self.mesh(surface)
-        if rig is None:
-            raise InvalidInput(f"the rig of {surface!r} is not loaded: give it to the session by add_surface.")
-        local = rig.rest_local.copy()
-        for joint, matrix in zip(pose.joints, pose.local, strict=True):
-            local[rig.joint_index(joint)] = matrix
-        return self.mesh(surface).with_points(skin(rig, forward_kinematics(rig.parents, local)))
-
-    @property
-    def meshes(self) -> dict[str, TriangleMesh]:
-        """The meshes that the session was given, by the names of their surfaces in the document as it is now."""
-        surfaces = self.document.surfaces.values()
-        return {s.name: self._meshes[s.digest] for s in surfaces if s.digest in self._meshes}
 
     # -- commands ------------------------------------------------------------------------------------------------
 
@@ -280,15 +177,15 @@ class Session(Verbs):
         step = self.history.prepare(command, origin, merge=merge)
         before = self.history.document
         with self._in_host(step.command.label(), step.after, step.revision):
-            if self._journal is not None:
-                self._journal.did(step, merged=step.before is not before)
+            if self._file is not None:
+                self._file.did(step, merged=step.before is not before)
             self.history.commit(step)
         self._tell(DocumentChanged("do", before, step.after, step.revision, step.command, origin))
         return step.revision
 
-    def submit(self, command: Command) -> int:
+    def submit(self, command: Command, *, origin: str = "user") -> int:
         """Commit what a verb made."""
-        return self.do(command)
+        return self.do(command, origin=origin)
 
     def undo(self) -> int:
         """Undo one step; answers the revision. With a host that has undo, it is the host's step that is undone."""
@@ -328,15 +225,14 @@ class Session(Verbs):
         host_asked = origin == "host"
         title = f"Go to revision {self.revision}"
         with contextlib.nullcontext() if host_asked else self._in_host(title, self.history.document, self.revision):
-            if self._journal is not None:
-                self._journal.went(self.revision)
+            if self._file is not None:
+                self._file.went(self.revision)
 
     def adopt(self, history: History) -> None:
         """Go on with another history: the host brought a document that this one does not know."""
         before, self.history = self.history.document, history
-        if self._journal is not None and self.path is not None:
-            self._journal.close(record=False)
-            self._journal = Journal.start(journal_path(self.path), history, None)
+        if self._file is not None:
+            self._file.restart(history)
         self._tell(DocumentChanged("goto", before, history.document, history.revision, None, "host"))
 
     @contextlib.contextmanager
@@ -410,19 +306,7 @@ class Session(Verbs):
             ) or next(iter(offered))
         if generator is None:
             return super().default_axis(surface, patch, points, generator)
-        return self.plugins.get(AXIS_GENERATORS, generator).generate(self._axis_request(surface, patch, points))
-
-    def _axis_request(self, surface: str, patch: str, points: SurfacePoints) -> Any:
-        from contact_core.contact.axis_generator import AxisRequest
-
-        others = {
-            other.name: self.axis(other.name).points
-            for other in self.document.patches.values()
-            if other.surface == surface and other.name != patch and other.original
-        }
-        rig = self.rigs.get(surface)
-        bones, owner = bones_of(rig, points) if rig is not None else (None, None)
-        return AxisRequest(self.mesh(surface), points, bones, owner, others)
+        return self.plugins.get(AXIS_GENERATORS, generator).generate(self.axis_request(surface, patch, points))
 
     # -- inside --------------------------------------------------------------------------------------------------
 

@@ -49,7 +49,7 @@ class Stroke(Verbs):
         """What would be committed now."""
         return self._command
 
-    def submit(self, command: Command) -> int:
+    def submit(self, command: Command, *, origin: str = "user") -> int:
         """Preview a command in place of the one before. Raises CommandRejected; then the old preview stays."""
         if not self._open:
             raise CommandRejected("this stroke is over.")

@@ -5,10 +5,11 @@ from contact_core.edit.verbs.gathering import GatheringVerbs
 from contact_core.edit.verbs.organising import OrganisingVerbs
 from contact_core.edit.verbs.placing import PlacingVerbs
 from contact_core.edit.verbs.sets import SetVerbs
+from contact_core.edit.verbs.surfaces import SurfaceVerbs
 
 
 class Verbs(GatheringVerbs, PlacingVerbs, OrganisingVerbs, SetVerbs):
     """All verbs. A session commits what they submit, a stroke previews it."""
 
 
-__all__ = ["Editor", "Verbs"]
+__all__ = ["Editor", "SurfaceVerbs", "Verbs"]

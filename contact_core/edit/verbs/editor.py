@@ -34,7 +34,7 @@ class Editor(ABC):
         """Reconstructed geometry, cached."""
 
     @abstractmethod
-    def submit(self, command: Command) -> int:
+    def submit(self, command: Command, *, origin: str = "user") -> int:
         """Take a command; answers the revision. Raises CommandRejected."""
 
     def mesh(self, surface: str) -> TriangleMesh:

@@ -33,6 +33,20 @@ def fill(session: Session, seed: int, steps: int = 40) -> None:
         session.do(step.command)
 
 
+def interrupt(session: Session) -> None:
+    """Let go as a killed process does: the journal has no end, and the next opening replays it."""
+    assert session._file is not None
+    session._file.close(in_order=False)
+
+
+class Twin(Session):
+    """Does what the child does, in memory alone."""
+
+    def save(self, path: Path | str | None = None) -> Path:
+        self.history.mark_clean()
+        return Path()
+
+
 def act(session: Session, chance: random.Random, number: int) -> None:
     """One action of a busy artist: mostly edits, some merges, undos, jumps, now and then a save."""
     kind = chance.random()
@@ -80,9 +94,9 @@ def test_200_kills_lose_nothing_that_was_acknowledged(tmp_path: Path) -> None:
     for number in range(200):
         path = tmp_path / f"{number // 8}.json"  # eight interruptions each, recovered one upon the other
         before = Session.open(path, discover=False)
-        before._let_go(in_order=False)  # as if it had been killed: the journal goes on
-        twin, chance = Session(before.document, discover=False), random.Random(number)
-        twin.history, twin.path = before.history, tmp_path / "twin" / "saves-go-here.json"
+        interrupt(before)
+        twin, chance = Twin(before.document, discover=False), random.Random(number)
+        twin.history = before.history
         acknowledged = killed_child(path, number, random.Random(number).uniform(0.0, 0.004))
         for k in range(acknowledged):
             act(twin, chance, k)
@@ -91,7 +105,7 @@ def test_200_kills_lose_nothing_that_was_acknowledged(tmp_path: Path) -> None:
         allowed.append(dump_document(twin.document))
         recovered = Session.open(path, discover=False)
         assert dump_document(recovered.document) in allowed, f"kill {number} after {acknowledged} actions"
-        recovered._let_go(in_order=False)
+        interrupt(recovered)
         actions += acknowledged
     assert actions > 400, "the children were killed before they did anything"
 
@@ -128,7 +142,7 @@ def test_damage_loses_nothing_before_it(
     path = tmp_path_factory.mktemp("damage") / "document.json"
     session = Session.open(path, discover=False)
     fill(session, 2, 12)
-    session._let_go(in_order=False)
+    interrupt(session)
     beside = journal_path(path)
     raw = bytearray(beside.read_bytes())
     position = min(int(where * len(raw)), len(raw) - 1)
@@ -153,7 +167,7 @@ def test_damage_loses_nothing_before_it(
         assert not lost_something or damaged_file in kept or not raw or bit is None
         again.do(SetExtra("after", 1))
         wanted = again.document
-        again._let_go(in_order=False)
+        interrupt(again)
     with Session.open(path, discover=False) as third:
         assert same_documents(third.document, wanted)
 
@@ -166,7 +180,7 @@ def test_an_interrupted_journal_is_replayed_and_said_so(tmp_path: Path) -> None:
     session.do(SetExtra("unsaved", [1, 2]))
     session.undo()
     session.redo()
-    session._let_go(in_order=False)
+    interrupt(session)
     with Session.open(path, discover=False) as again:
         assert same_documents(again.document, session.document)
         assert again.revision == session.revision and len(again.history.steps) == len(session.history.steps)
@@ -203,7 +217,7 @@ def test_a_document_changed_by_others_is_not_overwritten(tmp_path: Path) -> None
     session = Session.open(path, discover=False)
     session.save()
     session.do(SetExtra("mine", 1))
-    session._let_go(in_order=False)
+    interrupt(session)
     other = History(session.history.base)
     other.do(SetExtra("theirs", 1))
     path.write_bytes(dump_document(other.document))
