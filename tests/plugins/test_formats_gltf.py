@@ -197,6 +197,19 @@ def test_rest_may_differ_from_bind_and_scale_is_taken_out(tmp_path: Path) -> Non
     assert np.allclose(asset.mesh.points[asset.mesh.points[:, 2] < 100], expected[:, :3], atol=1e-3)
 
 
+def test_joint_names_become_unique(tmp_path: Path) -> None:
+    document = Document()
+    skinned(document, joints=5)
+    for k, name in enumerate(["root", "bone", "bone", "bone", "bone"]):
+        document.json["nodes"][k]["name"] = name
+    rig = GltfFiles().read(document.save(tmp_path)).rig
+    assert rig is not None
+    assert rig.joints == ("root", "root/bone", "bone/bone", "bone/bone_2", "bone/bone_3")
+    document.json["nodes"][1].pop("name")
+    rig = GltfFiles().read(document.save(tmp_path)).rig
+    assert rig is not None and rig.joints[1] == "node_1"
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.pose.rig import JointFreedom, Rig
 
+MAX_JOINTS = 4096
 SAME = 1e-4  # relative difference up to which two transforms count as one
 
 
@@ -117,6 +119,8 @@ def _skeleton(gltf: Gltf, nodes: Nodes, skins: list[int], sidecar: Sidecar | Non
         corrections[skin] = bridge
         bind |= {j: bridge @ own[k] for k, j in enumerate(joints) if j not in bind}
     order = [index for index in nodes.order if index in bind]
+    if len(order) > MAX_JOINTS:
+        raise InvalidInput(f"it has {len(order)} joints; up to {MAX_JOINTS} are read")
     names = _unique_names(nodes, order)
     parents, notes = _parents(gltf.path, nodes, order, names, sidecar)
     sequence = _sorted_parents_first(parents)
@@ -195,31 +199,31 @@ def _sorted_parents_first(parents: IntArray) -> list[int]:
     """Joints ordered so that parents come first; as they were when they do. Raises InvalidInput on a ring."""
     if (parents < np.arange(len(parents))).all():
         return list(range(len(parents)))
-    order, done = list[int](), set[int]([-1])
-    waiting = list(range(len(parents)))
-    while waiting:
-        ready = [k for k in waiting if int(parents[k]) in done]
-        if not ready:
-            raise InvalidInput("its joints form a ring instead of a tree")
-        order += ready
-        done |= set(ready)
-        waiting = [k for k in waiting if k not in done]
+    children: dict[int, list[int]] = defaultdict(list)
+    for index, parent in enumerate(parents.tolist()):
+        children[parent].append(index)
+    order = list(children[-1])
+    for index in order:  # grows while it is walked: level after level
+        order += children[index]
+    if len(order) != len(parents):
+        raise InvalidInput("its joints form a ring instead of a tree")
     return order
 
 
 def _unique_names(nodes: Nodes, order: list[int]) -> list[str]:
     """Node names, made unique by their parents' names where they repeat, and by a number where that repeats."""
-    names = [nodes.names[index] for index in order]
-    for k, index in enumerate(order):
-        if names.count(nodes.names[index]) > 1 and nodes.parents[index] >= 0:
-            names[k] = f"{nodes.names[int(nodes.parents[index])]}/{nodes.names[index]}"
-    taken = set[str]()
-    for k, name in enumerate(names):
-        fresh, number = name, 2
-        while fresh in taken:
-            fresh, number = f"{name}_{number}", number + 1
-        names[k] = fresh
-        taken.add(fresh)
+    uses = Counter(nodes.names[index] for index in order)
+    names, taken = list[str](), Counter[str]()
+    for index in order:
+        name, above = nodes.names[index], int(nodes.parents[index])
+        if uses[name] > 1 and above >= 0:
+            name = f"{nodes.names[above]}/{name}"
+        taken[name] += 1
+        names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
+    if len(set(names)) != len(names):
+        raise InvalidInput(
+            "its joint names repeat even with their parents' names; give each joint a name of its own"
+        )
     return names
 
 
