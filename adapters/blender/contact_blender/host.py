@@ -157,6 +157,11 @@ class BlenderHost(
 
     def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
         _, armature, placement = self._rigged(object_id)
+        if armature.library is not None:
+            raise InvalidInput(
+                f"{armature.name} is linked from {armature.library.filepath}, where poses would not be saved: make a"
+                " library override of it and pose that."
+            )
         local = unstretch_pose(pose, placement.surface_from_local)
         armature_id = self._ids.id_of(armature)
         with self.step("Pose"):

@@ -290,6 +290,30 @@ def test_what_cannot_be_a_rig_is_refused_in_words(bpy: Any, arm: Any) -> None:
     assert [each.name for each in bpy.data.objects if each.name.startswith("bad")] == []
 
 
+def test_a_linked_rig_is_read_and_its_override_posed(bpy: Any, scenes: Any, arm: Any, tmp_path: Path) -> None:
+    """Objects of a library have ids beside local ones of the same name; poses wait for an override, in words."""
+    rig = arm.read_rig("arm").rig
+    arm.save(tmp_path / "library.blend")
+    local = scenes.build(HostScene(SceneSpace(1.0, "Z"), rigs=(SceneRig("arm", arm_rig()),)))
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (there, here):
+        here.objects = there.objects
+    for linked in here.objects:
+        bpy.context.scene.collection.objects.link(linked)
+    ids = [item.id for item in local.objects() if item.kind == "rig"]
+    assert len(ids) == 2 and "arm" in ids
+    linked_id = next(key for key in ids if key != "arm")
+    asset = local.read_rig(linked_id)
+    assert asset.rig.surface.digest == rig.surface.digest
+    with pytest.raises(InvalidInput, match="library override"):
+        local.write_pose(linked_id, bent(rig, 1))
+    linked_rig = next(each for each in here.objects if each.type == "ARMATURE")
+    override = linked_rig.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    assert override is not None
+    posed = next(item.id for item in local.objects() if item.kind == "rig" and item.id not in ids)
+    local.write_pose(posed, bent(rig, 1))
+    assert np.abs(local.read_pose(posed).local - bent(rig, 1).local).max() < 1e-6
+
+
 def test_a_real_hand_with_weights_far_from_one(bpy: Any, scenes: Any, assets: Path) -> None:
     """Six meshes on one armature, weights summing to 0.88 .. 2.15, up to seven influences: each as in Blender."""
     host = scenes.BlenderHost(assets / "rigs" / "godot_xr_hand_right.blend")
