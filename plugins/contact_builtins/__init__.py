@@ -75,7 +75,7 @@ def contact_geodesic_engines() -> list[object]:
 
 @hookimpl
 def contact_hosts() -> list[object]:
-    return []
+    return ["contact_core.memory_host:MemoryHost"]
 
 
 @hookimpl

@@ -154,3 +154,11 @@ def test_refusals_are_sentences(
     code = main(["usd", *(str(sequence / a) if a.endswith(".usda") else a for a in arguments)])
     said = capsys.readouterr()
     assert code in (1, 2) and words in said.out + said.err
+
+
+def test_without_pxr_it_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    assert main(["usd", "inspect", "any.usda"]) == 2
+    assert 'pip install "contact-core[usd]"' in capsys.readouterr().err
