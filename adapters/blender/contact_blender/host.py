@@ -159,8 +159,8 @@ class BlenderHost(
         _, armature, placement = self._rigged(object_id)
         if armature.library is not None:
             raise InvalidInput(
-                f"{armature.name} is linked from {armature.library.filepath}, where poses would not be saved: make a"
-                " library override of it and pose that."
+                f"{armature.name} is linked from {armature.library.filepath}, so its pose would not be saved: make"
+                " a library override of it and pose that."
             )
         local = unstretch_pose(pose, placement.surface_from_local)
         armature_id = self._ids.id_of(armature)
