@@ -1,5 +1,6 @@
 """The built-in samples: closed, even, sound to bend, and the same every time."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -253,3 +254,15 @@ def test_a_changed_generator_never_meets_an_old_cache(tmp_path: Path, monkeypatc
             (tmp_path / f"{module}.py").write_text("a = 2")
         versions.append(BY_NAME["mug"].version())
     assert versions[0] == versions[1] != versions[2] != versions[3]
+
+
+def test_the_page_of_samples_lists_them_all(repository: Path) -> None:
+    """Name and number of joints of each, as docs/samples.md and the summaries say."""
+    page = (repository / "docs" / "samples.md").read_text()
+    for sample in ALL:
+        row = next(line for line in page.splitlines() if line.startswith(f"| `{sample.name}` |"))
+        rig = built(sample.name).rig
+        joints = row.split("|")[3].strip()
+        assert joints.startswith(f"{len(rig.joints)}" if rig else "") and bool(joints) == (rig is not None)
+        said = re.search(r"(\d+) joints", sample.summary)
+        assert said is None or (rig is not None and int(said[1]) == len(rig.joints))

@@ -63,7 +63,7 @@ WITCH_HAND = GeneratedSample(
     "witch_hand:build",
 )
 ALIEN_HAND = GeneratedSample(
-    "alien_hand", "manipulator", "a three-fingered alien hand with bulbous pads, 14 joints", "alien_hand:build"
+    "alien_hand", "manipulator", "a three-fingered alien hand with bulbous pads, 15 joints", "alien_hand:build"
 )
 TENTACLE = GeneratedSample(
     "tentacle", "manipulator", "a tentacle of 21 joints, tapered, its inner side flat", "tentacle:build"
