@@ -74,9 +74,15 @@ def freeze_json(data: Any) -> Any:
     raise FileRefused(f"JSON data holds numbers, texts, lists and objects, but {type(data).__name__} came.")
 
 
+class Fragment(str):
+    """JSON text that `pretty` puts in as it is."""
+
+
 def pretty(data: Any, indent: int = 0) -> str:
     """Deterministic JSON text for review: sorted keys, one item a line, numbers in rows."""
     pad = " " * (indent + 1)
+    if isinstance(data, Fragment):
+        return data
     if isinstance(data, dict) and data:
         lines = [f"{pad}{json.dumps(key)}: {pretty(data[key], indent + 1)}" for key in sorted(data)]
         return "{\n" + ",\n".join(lines) + "\n" + " " * indent + "}"

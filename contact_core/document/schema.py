@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from contact_core.contact.placement import Link
 from contact_core.contact.shape import PatchShape
-from contact_core.document.codec import from_json, pretty, to_json
+from contact_core.document.codec import Fragment, from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, Patch
+from contact_core.document.frozen_map import FrozenMap
 from contact_core.errors import FileRefused
 
 SCHEMA = "contact-core.document"
@@ -35,8 +38,13 @@ def document_from_json(data: Any, source: str = "the document") -> ContactDocume
 
 
 def dump_document(document: ContactDocument) -> bytes:
-    """UTF-8 JSON, made for review: sorted, one item a line. Equal documents give equal bytes."""
-    return (pretty(document_to_json(document)) + "\n").encode()
+    """UTF-8 JSON, made for review: sorted, one item a line. Equal documents give equal bytes.
+
+    A host stores this after each edit, and an edit changes one shape at most, so the text of shapes is kept.
+    """
+    shapes = {key: _shape_text(shape) for key, shape in document.shapes.items()}
+    data = document_to_json(replace(document, shapes=FrozenMap()))
+    return (pretty(data | {"shapes": shapes}) + "\n").encode()
 
 
 def parse_document(text: bytes, source: str = "the document") -> ContactDocument:
@@ -143,6 +151,16 @@ def _link_inconsistencies(
         above = document.patches[above.placement.parent]
     if above.name in seen:
         yield f"patch {patch.name!r} hangs on itself through {above.name!r}."
+
+
+_shape_texts: WeakKeyDictionary[PatchShape, Fragment] = WeakKeyDictionary()
+
+
+def _shape_text(shape: PatchShape) -> Fragment:
+    """The text of an immutable shape as it stands in a document, two levels deep."""
+    if shape not in _shape_texts:
+        _shape_texts[shape] = Fragment(pretty(to_json(shape), 2))
+    return _shape_texts[shape]
 
 
 def _refuse_constant(name: str) -> Any:

@@ -206,7 +206,7 @@ class PaintingVerbs(Editor):
         strength: Any,
     ) -> tuple[PatchShape, Axis]:
         mesh = self.mesh(surface)
-        points, strength = without_doubles(points, strength)
+        points, strength = without_doubles(mesh, points, strength)
         axis_shape, axis = draw_axis(mesh, picks, heading, dense=dense)
         coordinates = parameterize_patch(mesh, axis, points)
         bare = PatchShape(
@@ -217,7 +217,7 @@ class PaintingVerbs(Editor):
 
     def _extension(self, patch: str, points: SurfacePoints, strength: Any) -> Extend:
         here = self.points(patch)
-        points, strength = without_doubles(points, strength, here)
+        points, strength = without_doubles(self.mesh_of(patch), points, strength, here)
         if not len(points):
             raise CommandRejected(f"all of these points are on {patch!r} already.")
         coordinates = self._measured(patch, points)
@@ -310,16 +310,22 @@ class PaintingVerbs(Editor):
 
 
 def without_doubles(
-    points: SurfacePoints, strength: Any = None, known: SurfacePoints | None = None
+    mesh: TriangleMesh, points: SurfacePoints, strength: Any = None, known: SurfacePoints | None = None
 ) -> tuple[SurfacePoints, FloatArray]:
-    """The points that are not doubles of one another or of known ones (1e-9 in barycentrics), with strengths."""
+    """The points that are not doubles of one another or of known ones, with their strengths.
+
+    Doubles lie at the same place (1e-9 in barycentrics), whichever of its faces an edge or vertex point names.
+    """
     n = len(points)
     given = np.ones(n) if strength is None else np.asarray(strength, dtype=float)
     if given.shape != (n,):
         raise InvalidInput(f"strength needs one number for each of {n} points, but has shape {given.shape}.")
     before = len(known) if known is not None else 0
     together = SurfacePoints.concatenate([known, points]) if known is not None else points
-    rows = np.column_stack([together.faces, np.round(together.barycentric * 1e9).astype(np.int64)])
+    weights = np.round(together.barycentric * 1e9).astype(np.int64)  # (n, 3)
+    corners = np.where(weights > 0, mesh.faces[together.faces], -1)  # (n, 3)
+    order = np.argsort(corners, axis=1)
+    rows = np.column_stack([np.take_along_axis(part, order, axis=1) for part in (corners, weights)])
     _, first = np.unique(rows, axis=0, return_index=True)
     keep = np.sort(first[first >= before]) - before
     return points[keep], given[keep]

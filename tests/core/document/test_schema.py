@@ -56,6 +56,14 @@ def test_bytes_do_not_depend_on_the_order_of_making(seed: int) -> None:
     assert dump_document(ContactDocument(**parts)) == dump_document(document)
 
 
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_what_is_kept_of_the_text_changes_no_byte(seed: int) -> None:
+    document = random_document(seed)
+    assert dump_document(document).decode() == pretty(schema.document_to_json(document)) + "\n"
+    assert dump_document(copy.deepcopy(document)) == dump_document(document)
+
+
 def test_it_is_made_for_review() -> None:
     """One edit changes a few lines, no line is long, and it is plain JSON."""
     document = random_document(5, 40)

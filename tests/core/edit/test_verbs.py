@@ -394,9 +394,14 @@ def test_merge_and_split_move_no_point(session: Session) -> None:
 def test_points_painted_twice_are_kept_once(session: Session) -> None:
     count = len(session.points("palm"))
     with pytest.raises(CommandRejected, match="already"):
-        session.paint("palm", session.document and session.points("palm"))
+        session.paint("palm", session.points("palm"))
     session.paint("palm", SurfacePoints.concatenate([session.points("palm"), session.points("thumb")[[0, 0]]]))
     assert len(session.points("palm")) == count + 1
+    mesh = session.mesh("torus")
+    vertex = int(mesh.faces[50, 0])
+    faces, corners = np.nonzero(mesh.faces == vertex)
+    session.paint("palm", SurfacePoints(faces, np.eye(3)[corners]))  # one vertex, named by every face round it
+    assert len(session.points("palm")) == count + 2
 
 
 def test_symmetric_copies_are_mirror_images_on_a_symmetric_mesh() -> None:
