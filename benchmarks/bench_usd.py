@@ -1,13 +1,13 @@
 """USD: reading the arrays of a million triangles, one edit through the adapter, undo, a key.
 
-    python benchmarks/bench_usd.py
+    python -m benchmarks.bench_usd [--quick]
 
-Medians of several runs, wall time. "connectivity" is what a surface computes when first asked for, told apart.
+Medians of several runs, wall time. Connectivity is built when first asked for and is not part of reading.
 """
 
 from __future__ import annotations
 
-import statistics
+import argparse
 import sys
 import tempfile
 import time
@@ -17,6 +17,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom, Vt
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from benchmarks.harness import interleaved, record
 from contact_core.document.asset import Asset
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
@@ -25,16 +27,12 @@ from contact_core.testing.host_scenes import arm_rig, bent
 from contact_usd.host import UsdHost
 
 SIDE = 708  # points along one side: about a million triangles
+PATCH = 500  # points
 
 
-def seconds(work: Callable[[], object], repeats: int = 7) -> float:
+def seconds(work: Callable[[], object], repeats: int) -> float:
     """Median wall time of a call."""
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - began)
-    return statistics.median(times)
+    return interleaved({"it": work}, repeats)["it"].median
 
 
 def sheet(side: int, *, quads: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -59,31 +57,31 @@ def million(folder: Path, *, quads: bool) -> Path:
     return path
 
 
-def main() -> int:
-    rows: list[tuple[str, float, float | None]] = []  # what, milliseconds, target
-    with tempfile.TemporaryDirectory() as name:
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer repeats")
+    arguments, _ = parser.parse_known_args()
+    record("USD adapter", {**reading(3 if arguments.quick else 9), **editing(9 if arguments.quick else 41)})
+
+
+def reading(repeats: int) -> dict[str, str]:
+    """A million triangles, and as many from quads, from a binary layer."""
+    rows = {}
+    with tempfile.TemporaryDirectory() as folder:
         for quads in (False, True):
-            path = million(Path(name), quads=quads)
-            host = UsdHost(path)
+            host = UsdHost(million(Path(folder), quads=quads))
+            kind = "1M triangles out of 500k quads" if quads else "1M triangles"
             began = time.perf_counter()
-            asset = host.read_surface("/sheet")
-            first = time.perf_counter() - began
-            kind = "500k quads" if quads else "1M triangles"
-            rows.append((f"read {kind}, first time", 1e3 * first, None))
-            again = seconds(lambda h=host: h.read_surface("/sheet"))
-            rows.append((f"read {kind}", 1e3 * again, None if quads else 300.0))
-            arrays = (asset.mesh.points, asset.mesh.faces)
-            rows.append(("  digest", 1e3 * seconds(lambda a=arrays: TriangleMesh(*a).digest), None))
-    rows += edits()
-    width = max(len(what) for what, _, _ in rows)
-    for what, milliseconds, target in rows:
-        told = "" if target is None else f"  (target {target:g} ms{'' if milliseconds < target else ': MISSED'})"
-        print(f"{what:<{width}}  {milliseconds:9.2f} ms{told}")
-    return int(any(target is not None and value >= target for _, value, target in rows))
+            mesh = host.read_surface("/sheet").mesh
+            rows[f"read {kind}, first time"] = spelled(time.perf_counter() - began)
+            again = seconds(lambda h=host: h.read_surface("/sheet"), repeats)
+            rows[f"read {kind}"] = spelled(again, None if quads else 0.3)
+        rows["their digest"] = spelled(seconds(lambda: TriangleMesh(mesh.points, mesh.faces).digest, repeats))
+    return rows
 
 
-def edits() -> list[tuple[str, float, float | None]]:
-    """A 500-point patch on a sheet in a stage: rotate, undo, key a pose."""
+def editing(repeats: int) -> dict[str, str]:
+    """Patches of 500 points on a sheet in a stage, stored there with every edit: turn one, undo, key a pose."""
     points, faces = sheet(60, quads=False)
     host = UsdHost()
     key = host.add(Asset("sheet", TriangleMesh(points, faces), meters_per_unit=1.0))
@@ -92,21 +90,27 @@ def edits() -> list[tuple[str, float, float | None]]:
     session = Session(host=host, discover=False)
     mesh = host.read_surface(key).mesh
     session.add_surface("sheet", mesh)
-    middle = np.argsort(np.linalg.norm(mesh.points - [0.5, 0.5, 0.0], axis=1), kind="stable")[:500]
+    middle = np.argsort(np.linalg.norm(mesh.points - [0.5, 0.5, 0.0], axis=1), kind="stable")[:PATCH]
     patch = SurfacePoints.at_vertices(mesh, middle)
-    session.paint("patch", patch, surface="sheet", axis=patch[[0, 400]])
-    data = host.stored_document()
-    assert data is not None
-    rotate = seconds(lambda: session.rotate("patch", 0.01), 31)
-    undo = seconds(session.undo, 15)
+    rows = {}
+    for count in (1, 30):
+        for number in range(len(session.document.patches), count):
+            session.paint(f"patch {number}", patch, surface="sheet", axis=patch[[0, 400]])
+        turn = seconds(lambda: session.rotate("patch 0", 0.01), repeats)
+        rows[f"turn a patch of {PATCH} points, one of {count}"] = spelled(turn, 0.015)
+        rows[f"undo of that, one of {count}"] = spelled(seconds(session.undo, repeats - 1))
     frames = iter(range(1000))
-    keyed = seconds(lambda: host.write_pose(arm, bent(rig, 1), float(next(frames))), 15)
-    return [
-        (f"rotate a patch of 500 points ({len(data.data)} bytes stored)", 1e3 * rotate, 15.0),
-        ("undo of that", 1e3 * undo, None),
-        ("key a pose", 1e3 * keyed, None),
-    ]
+    rows["key a pose"] = spelled(seconds(lambda: host.write_pose(arm, bent(rig, 1), float(next(frames))), repeats))
+    return rows
+
+
+def spelled(value: float, target: float | None = None) -> str:
+    """Milliseconds, and whether a target is kept."""
+    told = f"{1e3 * value:.3g} ms"
+    if target is None:
+        return told
+    return f"{told} (wanted: under {1e3 * target:g} ms{'' if value < target else '; MISSED'})"
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -156,7 +156,8 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         return storage.read(self.stage)
 
     def store_document(self, document: StoredDocument) -> None:
-        check_overwrite(self.stored_document())
+        schema = storage.read_schema(self.stage)
+        check_overwrite(None if schema is None else StoredDocument(b"", 0, schema))
         with self.step("Document"):
             storage.write(self.layer, document)
 

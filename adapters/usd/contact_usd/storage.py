@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import re
 
 from pxr import Sdf, Usd
 
@@ -12,7 +11,7 @@ from contact_core.host import StoredDocument
 
 ROOT = Sdf.Path("/Contacts")
 SCHEMA = "ContactDocumentAPI"
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")  # what a text layer might not give back
+_CONTROL = bytes([*range(9), *range(11, 32), 127])  # what a text layer might not give back
 _UNIFORM = Sdf.VariabilityUniform
 _ATTRIBUTES = {
     "contact:document": Sdf.ValueTypeNames.String,
@@ -33,6 +32,12 @@ def read(stage: Usd.Stage) -> StoredDocument | None:
         return StoredDocument(data, int(revision), int(schema))
     except (ValueError, TypeError, AttributeError) as error:
         raise FileRefused(f"the contact document on {ROOT} is damaged: {error}") from error
+
+
+def read_schema(stage: Usd.Stage) -> int | None:
+    """The schema number of what the stage holds, without reading it."""
+    attribute = stage.GetAttributeAtPath(ROOT.AppendProperty("contact:schema"))
+    return int(attribute.Get()) if attribute and attribute.HasAuthoredValue() else None
 
 
 def write(layer: Sdf.Layer, document: StoredDocument) -> None:
@@ -62,7 +67,7 @@ def _as_text(data: bytes) -> tuple[str, str]:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
-        text = "\x00"
-    if _CONTROL.search(text):
+        text = ""
+    if not text or len(data.translate(None, _CONTROL)) < len(data):
         return base64.b64encode(data).decode("ascii"), "base64"
     return text, "utf-8"
