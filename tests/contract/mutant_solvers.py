@@ -1,0 +1,139 @@
+"""Solvers that are broken on purpose, each in one way; `breaks` says which clause must see it first."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
+from contact_core.pose.problem import PoseProblem
+from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.testing.mutants import Mutant
+from contact_core.testing.solver_contract import SolverContract
+
+
+class Sound(LevenbergMarquardt):
+    """What the mutants start from."""
+
+    name = "mutant"
+
+
+class Overstepping(Sound):
+    """Leaves the limits by a hair."""
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        solution = super().solve(problem, options, progress)
+        theta = solution.theta * (1.0 + 1e-9)
+        return replace(solution, theta=theta, value=problem.value(problem.state(theta)))
+
+
+class Forgetful(Sound):
+    """Answers somewhere near the start, which need not be better."""
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        solution = super().solve(problem, options, progress)
+        lower, upper = problem.limits_of_theta
+        if options is not None and options.max_iterations == 1:
+            theta = np.clip(problem.start + problem.scale, lower, upper)
+            return replace(solution, theta=theta, value=problem.value(problem.state(theta)))
+        return solution
+
+
+class Boastful(Sound):
+    """Says it settled whatever happened."""
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        solution = super().solve(problem, options, progress)
+        stopped = solution.status is SolveStatus.STOPPED
+        return replace(solution, status=SolveStatus.CONVERGED) if stopped else solution
+
+
+class Moody(Sound):
+    """Starts somewhere else every time."""
+
+    calls = itertools.count(1)
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        solution = super().solve(problem, options, progress)
+        return replace(solution, trace=(*solution.trace, float(next(self.calls))))
+
+
+class Deaf(Sound):
+    """Does not hear a cancel."""
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        if progress is None:
+            return super().solve(problem, options)
+        return super().solve(problem, options, lambda seen: (progress(seen), False)[1])
+
+
+class Presuming(Sound):
+    """Moves what is held."""
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        return super().solve(replace(problem, held=None), options, progress)
+
+
+class TestOverstepping(Mutant, SolverContract):
+    breaks = "S03"
+    consequences = ("S15",)  # its answer after a broken term is no better than the start
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Overstepping()
+
+
+class TestForgetful(Mutant, SolverContract):
+    breaks = "S04"
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Forgetful()
+
+
+class TestBoastful(Mutant, SolverContract):
+    breaks = "S07"
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Boastful()
+
+
+class TestMoody(Mutant, SolverContract):
+    breaks = "S08"
+    consequences = ("S09",)
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Moody()
+
+
+class TestDeaf(Mutant, SolverContract):
+    breaks = "S10"
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Deaf()
+
+
+class TestPresuming(Mutant, SolverContract):
+    breaks = "S12"
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Presuming()
