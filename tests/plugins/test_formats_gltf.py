@@ -305,3 +305,46 @@ def test_a_pose_for_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ContactError, match="no such asset"):
         GltfFiles().write(tmp_path / "a.glb", [bar()], {"hand": bent()})
     assert not list(tmp_path.iterdir())
+
+
+def two_skins(bridge: np.ndarray, *, contradict: bool) -> Document:
+    """Two triangles on the same two joints; the second is bound in a space moved by `bridge`."""
+    document = Document()
+    joints = document.accessor([[0, 1, 0, 0]] * 3, "VEC4", UBYTE)
+    weights = document.accessor([[0.5, 0.5, 0, 0]] * 3, "VEC4")
+    inverse = np.tile(np.eye(4), (2, 1, 1))
+    inverse[1, 0, 3] = -1.0
+    other = inverse @ np.linalg.inv(bridge)
+    other[1, 2, 3] += 0.5 * contradict
+    shift = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]) @ bridge[:3, :3].T + bridge[:3, 3]
+    document.node(name="a", children=[1])
+    document.node(name="b", translation=[1, 0, 0])
+    document.json["skins"] = []
+    for k, (points, matrices) in enumerate(
+        ((np.array([[0.0, 0, 3], [1, 0, 3], [0, 1, 3]]), inverse), (shift, other))
+    ):
+        attributes = {"POSITION": document.accessor(points), "JOINTS_0": joints, "WEIGHTS_0": weights}
+        document.node(mesh=document.mesh({"attributes": attributes}), skin=k)
+        columns = document.accessor(matrices.transpose(0, 2, 1).reshape(-1, 16), "MAT4")
+        document.json["skins"].append({"joints": [0, 1], "inverseBindMatrices": columns})
+    return document
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_skins_bound_in_spaces_of_their_own_come_together(
+    tmp_path_factory: pytest.TempPathFactory, seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    bridge = np.eye(4)
+    bridge[:3, :3], _ = np.linalg.qr(random.normal(size=(3, 3)))
+    bridge[:3, 3] = random.normal(size=3)
+    asset = GltfFiles().read(two_skins(bridge, contradict=False).save(tmp_path_factory.mktemp("s")))
+    assert asset.rig is not None and asset.rig.joints == ("a", "b")
+    low = asset.mesh.points[asset.mesh.points[:, 2] < 1.5]
+    assert np.allclose(low, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], atol=1e-5)
+
+
+def test_skins_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileRefused, match="one bind pose per joint"):
+        GltfFiles().read(two_skins(np.eye(4), contradict=True).save(tmp_path))
