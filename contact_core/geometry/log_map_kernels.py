@@ -19,6 +19,7 @@ from contact_core.geometry.tangent_kernels import (
     angle_round_vertex,
     direction_of_next,
     heading_at,
+    norm,
     place,
     vertex_scale,
 )
@@ -145,7 +146,7 @@ def light_targets(
             grazes = miss_left <= slack * left_ray and miss_right <= slack * right_ray
             rank = GRAZING_RANK if grazes else math.inf
         if rank < math.inf:
-            distance = record[SIGMA] + math.hypot(rx, ry)
+            distance = record[SIGMA] + norm(rx, ry)
             zx, zy = rx * record[COS] - ry * record[SIN], rx * record[SIN] + ry * record[COS]
             offer(
                 t, rank * distance, distance, integers[w, ROOT], integers[w, WEDGE], zx, zy, h, rx, ry,
@@ -169,7 +170,7 @@ def farthest_target(
             h = 3 * host_face(t, target_integers)
             for k in range(3):
                 d = distance_at(tail[h + k], epoch, reach)
-                best = min(best, d + math.hypot(target_floats[t, X + 2 * k], target_floats[t, Y + 2 * k]))
+                best = min(best, d + norm(target_floats[t, X + 2 * k], target_floats[t, Y + 2 * k]))
         bound = max(bound, best)
         if bound >= limit:
             return limit
@@ -193,7 +194,7 @@ def light_own_face(
     t = int(listed[f, 1]) if listed[f, 0] == epoch else -1
     while t >= 0:
         rx, ry = target_floats[t, X + 2 * k] - x, target_floats[t, Y + 2 * k] - y
-        distance = math.hypot(rx, ry)
+        distance = norm(rx, ry)
         offer(t, distance, distance, root, base, rx, ry, base, rx, ry, target_floats, target_integers)
         t = target_integers[t, NEXT]
 
@@ -332,7 +333,7 @@ def read_targets(
                 x, y = row[X + 2 * k], row[Y + 2 * k]
                 way = distance_at(tail[base + k], epoch, reach)
                 if 0.0 < way < math.inf:
-                    way += math.hypot(x, y)
+                    way += norm(x, y)
                     offer(
                         t, way * CORNER_RANK, way, tail[base + k], base + k, x, y, base + k, x, y,
                         target_floats, target_integers,
@@ -375,7 +376,7 @@ def read_chains(
             away = angle_round_vertex(wedge, zx, zy, shape)
             turn = (away - leg[root, 2]) * vertex_scale(root, angle_sum, kind) - PI
             turning_angles[i] = turn + 2.0 * PI if turn <= -PI else turn
-            lengths[i] = math.hypot(zx, zy)
+            lengths[i] = norm(zx, zy)
             zx, zy, wedge, root = leg[root, 0], leg[root, 1], origin[root, 1], origin[root, 0]
         s = -1 - root
         b0, b1, b2 = source_barycentric[s, 0], source_barycentric[s, 1], source_barycentric[s, 2]
@@ -383,7 +384,7 @@ def read_chains(
         if on == ON_EDGE and wedge != element:
             zx, zy = -zx, -zy
         elif on == ON_VERTEX:
-            length = math.hypot(zx, zy)
+            length = norm(zx, zy)
             angle = angle_round_vertex(wedge, zx, zy, shape) * vertex_scale(element, angle_sum, kind)
             zx, zy = length * math.cos(angle), length * math.sin(angle)
         first_legs[t, 0], first_legs[t, 1] = zx, zy

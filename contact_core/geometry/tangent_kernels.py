@@ -80,6 +80,12 @@ def direction_in_face(h: int, shape: FloatArray) -> tuple[float, float]:
 
 
 @kernel
+def norm(x: float, y: float) -> float:
+    """Length of (x, y); math.hypot guards against overflow at several times the cost."""
+    return math.sqrt(x * x + y * y)
+
+
+@kernel
 def turned(x: float, y: float, cos: float, sin: float) -> tuple[float, float]:
     """(x + iy)(cos + i sin)."""
     return x * cos - y * sin, x * sin + y * cos

@@ -16,20 +16,21 @@ from contact_core.geometry.topology import Topology
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Polylines:
-    """k polylines on a surface: rows offsets[i]:offsets[i + 1] of points are polyline i, start and end included.
+    """k polylines on a surface: rows begins[i]:ends[i] of points are polyline i, start and end included.
 
-    points: (c) surface points; those between start and end lie on edges or vertices. offsets: (k + 1,).
+    points: (c) surface points; those between start and end lie on edges or vertices. begins, ends: (k,).
     """
 
     points: SurfacePoints
-    offsets: IntArray
+    begins: IntArray
+    ends: IntArray
 
     def __len__(self) -> int:
-        return len(self.offsets) - 1
+        return len(self.begins)
 
     def __getitem__(self, index: int) -> SurfacePoints:
         """The surface points of one polyline."""
-        return self.points[self.offsets[index] : self.offsets[index + 1]]
+        return self.points[self.begins[index] : self.ends[index]]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -87,16 +88,17 @@ def trace_chains(
     require_on_surface(topology, starts, "starts")
     faces, barycentric = np.empty(count, np.int64), np.empty((count, 3))
     headings, remaining = np.empty(count, np.complex128), np.empty(count)
+    order = np.argsort(starts.faces, kind="stable") if count >= _WORTH_SORTING else np.arange(count)
     room = 64 * (count + len(lengths)) if polyline else 0
     while True:
         line_faces, line_barycentric = np.empty(room, np.int64), np.empty((room, 3))
-        line_offsets = np.zeros(count + 1, np.int64)
+        line_ends = np.zeros((count, 2), np.int64)
         status, where, element = trace(
             starts.faces, starts.barycentric, first_leg.view(np.float64).reshape(-1, 2),
             offsets, turning_angles, lengths,
             topology.tail, topology.twin, topology.shape, topology.first, topology.angle_sum, topology.kind,
             faces, barycentric, headings.view(np.float64).reshape(-1, 2), remaining,
-            line_faces, line_barycentric, line_offsets,
+            line_faces, line_barycentric, line_ends, order,
         )  # fmt: skip
         if status != NO_ROOM:
             break
@@ -105,12 +107,14 @@ def trace_chains(
         raise _refusal(topology, status, where, element)
     lines = None
     if polyline:
-        way = SurfacePoints.trusted(line_faces[:where].copy(), line_barycentric[:where].copy())
-        lines = Polylines(way, _read_only(line_offsets))
+        way = SurfacePoints.trusted(line_faces[:where], line_barycentric[:where])
+        lines = Polylines(way, _read_only(line_ends[:, 0]), _read_only(line_ends[:, 1]))
     return Trace(SurfacePoints.trusted(faces, barycentric), _read_only(headings), _read_only(remaining), lines)
 
 
 _NO_OFFSETS: Any = object()
+# Many walks go in order of their first face, so that neighbours find the mesh in the cache (1.5 to 5 times faster).
+_WORTH_SORTING = 1024
 _NO_NUMBERS: FloatArray = np.zeros(0)
 
 

@@ -175,26 +175,28 @@ def walk(
         near = SNAP * size
         across = dx * uy - dy * ux
         if across == 0.0:  # along a face without area
-            step, t = max((length - x) if dx > 0.0 else x, 0.0), 0.0
+            step, along = max((length - x) if dx > 0.0 else x, 0.0), 0.0
         else:
-            step = max(((ox - x) * uy + y * ux) / across, 0.0)
-            t = min(max(((ox - x) * dy + y * dx) / (across * size), 0.0), 1.0)
+            inverse = 1.0 / across
+            step = max(((ox - x) * uy + y * ux) * inverse, 0.0)
+            along = min(max(((ox - x) * dy + y * dx) * inverse, 0.0), size)  # from the tail or head to the apex
         if remaining <= step + near:
             step = min(step, remaining)
             return DONE, h, x + step * dx, y + step * dy, dx, dy, 0.0, line_end
         remaining -= step
-        if t * size <= near:
-            t = 0.0
-        elif (1.0 - t) * size <= near:
-            t = 1.0
+        if along <= near:
+            along = 0.0
+        elif size - along <= near:
+            along = size
         if len(line_faces) > 0:
             if line_end >= len(line_faces):
                 return NO_ROOM, h, x, y, dx, dy, remaining, line_end
+            t = along / size
             record(h, 1.0 - t if right else 0.0, t, line_faces, line_barycentric, line_end)
             line_end += 1
-        x, y = ox + t * size * ux, t * size * uy
-        if t == 0.0 or t == 1.0:
-            if t == 1.0:
+        x, y = ox + along * ux, along * uy
+        if along == 0.0 or along == size:
+            if along == size:
                 corner = preceding(h)
                 bx, by = turned_back(dx, dy, ax / shape[corner, 0], ay / shape[corner, 0])
             elif right:
@@ -215,9 +217,9 @@ def walk(
             status = DONE if other == BOUNDARY else MET_BLOCKED_EDGE
             return status, h if other == BOUNDARY else edge, x, y, dx, dy, remaining, line_end
         if right:  # the other side runs from the apex to the head
-            x, ux, uy = (1.0 - t) * size, -ux, -uy
+            x, ux, uy = size - along, -ux, -uy
         else:
-            x = t * size
+            x = along
         dx, dy = turned_back(dx, dy, ux, uy)
         h, y = other, 0.0
     return TOO_LONG, h, x, y, dx, dy, remaining, line_end
@@ -276,17 +278,19 @@ def trace(
     remaining: FloatArray,
     line_faces: IntArray,
     line_barycentric: FloatArray,
-    line_offsets: IntArray,
+    line_ends: IntArray,
+    order: IntArray,
 ) -> tuple[int, int, int]:
     """Trace k chains of straight legs; returns (status, chain, blocked element).
 
     first_legs (k, 2) tangent vectors at the starts; then, per row of offsets (k + 1,), legs that turn from straight
     on by turning_angles and run for lengths. Writes faces (k,), barycentric (k, 3), headings (k, 2) and
-    remaining (k,); if the line buffers have rows the crossings, start and end included, with line_offsets (k + 1,).
+    remaining (k,); if the line buffers have rows the crossings, start and end included, with line_ends (k, 2):
+    first row, row after the last. order (k,): who walks when.
     """
     lines = len(line_faces) > 0
     cursor = 0
-    for i in range(len(start_faces)):
+    for i in order:
         f = start_faces[i]
         b0, b1, b2 = start_barycentric[i, 0], start_barycentric[i, 1], start_barycentric[i, 2]
         on, element, x, y = place(f, b0, b1, b2, tail, twin, shape)
@@ -297,7 +301,7 @@ def trace(
         rest = math.hypot(zx, zy)
         hx, hy = (1.0, 0.0) if rest < 1e-290 else (zx / rest, zy / rest)
         if lines:
-            line_offsets[i] = cursor
+            line_ends[i, 0] = cursor
             cursor = append(f, b0, b1, b2, line_faces, line_barycentric, cursor)
         leg = offsets[i]
         while True:
@@ -333,7 +337,7 @@ def trace(
                 line_barycentric,
                 cursor,
             )
-            line_offsets[i + 1] = cursor
+            line_ends[i, 1] = cursor
             if cursor > len(line_faces):
                 return NO_ROOM, i, 0
     return DONE, cursor, 0

@@ -27,6 +27,7 @@ from contact_core.geometry.tangent_kernels import (
     corner_angle,
     direction_in_face,
     direction_of_next,
+    norm,
 )
 from contact_core.geometry.topology_kernels import (
     BLOCKED,
@@ -148,7 +149,7 @@ def cast(
     b0, b1, sy = max(b0, 0.0), min(b1, length), min(sy, 0.0)
     if not b1 > b0 or h == BOUNDARY:
         return
-    to_b0, to_b1 = math.hypot(b0 - sx, sy), math.hypot(b1 - sx, sy)
+    to_b0, to_b1 = norm(b0 - sx, sy), norm(b1 - sx, sy)
     key = sigma + (to_b0 if sx <= b0 else (to_b1 if sx >= b1 else -sy))
     if key > bound:
         return
@@ -161,9 +162,9 @@ def cast(
         from_apex = distance_at(tail[preceding(edge)], epoch, reach)
         x, y = length - shape[edge, 1], shape[edge, 2]
         if side == LEFT_CHILD:  # the third vertex of the face lies right of the window
-            if from_apex + math.hypot(b0 - x, y) < d0:
+            if from_apex + norm(b0 - x, y) < d0:
                 return
-        elif from_apex + math.hypot(b1 - x, y) < d1:
+        elif from_apex + norm(b1 - x, y) < d1:
             return
     w = state[FREE]
     if w >= 0:
@@ -209,7 +210,7 @@ def propagate(
     split_distance, split_crossing = -1.0, 0.0
     if beyond_left <= span * slack * left_ray and beyond_right <= span * slack * right_ray:
         apex = tail[to_left]
-        distance = sigma + math.hypot(rx, ry)
+        distance = sigma + norm(rx, ry)
         sharp = left and right
         if distance < distance_at(apex, epoch, reach) * (1.0 if sharp else SURELY):
             cx, cy = -ax / left_length, -ay / left_length
@@ -356,7 +357,7 @@ def emit_source(
     for side in range(3):
         if side == 2 and on == ON_VERTEX:  # known better than by way of the far corner
             x, y = shape[h, 0], 0.0
-        distance = math.hypot(x, y)
+        distance = norm(x, y)
         v = tail[h]
         if distance < distance_at(v, epoch, reach):
             lower(
