@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import fcntl
+import hashlib
 import os
 import shutil
 import subprocess
@@ -35,7 +36,7 @@ def environment(blender: str = DEFAULT) -> Path:
     python, ready = folder / "bin" / "python", folder / ".ready"
     folder.parent.mkdir(exist_ok=True)
     with _alone(folder.with_suffix(".lock")):
-        wanted = str((REPOSITORY / "pyproject.toml").stat().st_mtime_ns)
+        wanted = hashlib.sha256((REPOSITORY / "pyproject.toml").read_bytes()).hexdigest()
         if ready.is_file() and ready.read_text() == wanted:
             return python
         if not python.is_file():
@@ -44,9 +45,10 @@ def environment(blender: str = DEFAULT) -> Path:
         made = subprocess.run(
             [*pip, f"bpy=={blender}.*", "--editable", f"{REPOSITORY}[testing]"], capture_output=True, text=True
         )
-        if made.returncode:
+        if made.returncode == 0:
+            ready.write_text(wanted)
+        elif not ready.is_file():  # else an older one serves, without a network too
             raise Unavailable(f"bpy {blender} could not be installed: {made.stderr.strip().splitlines()[-1]}")
-        ready.write_text(wanted)
     return python
 
 

@@ -19,6 +19,7 @@ from contact_core.host import SceneSpace
 from contact_core.pose.chart import Chart
 from contact_core.pose.rig import JointFreedom, Pose, forward_kinematics, skin
 from contact_core.pose.solver import SolveOptions
+from contact_core.testing.host_checks import volume
 from contact_core.testing.host_scenes import HostScene, SceneRig, affine, arm_rig, bent
 from contact_core.testing.rigs import any_freedom, hand_like
 
@@ -54,6 +55,7 @@ def test_awkward_rigs_skin_as_in_blender(bpy: Any, arm: Any) -> None:
 
     made = bpy.data.objects["arm"]
     armature = made.parent
+    outward = volume_about_centre(arm.read_rig("arm").mesh)
     armature.scale = (2.0, 2.0, 2.0)
     made.parent = None
     made.matrix_world = Matrix(affine((0.1, 0.2, 0.3), (-1.5, 0.7, 1.2), (0.5, 0.0, 0.0)).tolist())
@@ -68,6 +70,47 @@ def test_awkward_rigs_skin_as_in_blender(bpy: Any, arm: Any) -> None:
     assert "stay at rest" in " ".join(asset.notes) and "normalised" in " ".join(asset.notes)
     assert asset.details["linear skinning is exact"], asset.details
     assert worst_difference(arm, "arm") < 1e-5
+    assert outward > 0.0 and volume_about_centre(asset.mesh) > 0.0  # the mirrored mesh is not inside out
+
+
+def volume_about_centre(mesh: TriangleMesh) -> float:
+    """Signed volume of the cones from the centre: positive for an open tube seen from outside, too."""
+    return volume(mesh.with_points(mesh.points - mesh.points.mean(axis=0)))
+
+
+def test_in_edit_mode_the_rig_has_the_edits_so_far(bpy: Any, arm: Any) -> None:
+    """The surface and the weights are those being edited; after leaving Edit Mode they are the same."""
+    import bmesh
+
+    made = bpy.data.objects["arm"]
+    bpy.context.view_layer.objects.active = made
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(made.data)
+    edited.verts.ensure_lookup_table()
+    edited.verts[7].co.x += 0.5
+    edited.verts[7][edited.verts.layers.deform.active][made.vertex_groups["thumb"].index] = 0.6
+    bmesh.update_edit_mesh(made.data)
+    during = arm.read_rig("arm").rig
+    bpy.ops.object.mode_set(mode="OBJECT")
+    after = arm.read_rig("arm").rig
+    assert during.surface.digest == after.surface.digest != arm_rig().surface.digest
+    np.testing.assert_array_equal(during.skin_weights, after.skin_weights)
+    assert after.skin_weights[7].max() < 0.7
+
+
+def test_a_connected_bone_stays_where_its_parent_ends(bpy: Any, arm: Any) -> None:
+    """Blender ignores the location of a connected bone, and so does the pose that is read."""
+    armature = bpy.data.objects["arm"].parent
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones["elbow"].tail = armature.data.edit_bones["wrist"].head
+    armature.data.edit_bones["wrist"].use_connect = True
+    bpy.ops.object.mode_set(mode="OBJECT")
+    armature.pose.bones["wrist"].location = (0.3, 0.2, 0.1)
+    rig, pose = arm.read_rig("arm").rig, arm.read_pose("arm")
+    np.testing.assert_allclose(pose.local, rig.rest_local, atol=1e-6)
+    ours = skin(rig, forward_kinematics(rig.parents, pose.local))
+    np.testing.assert_allclose(arm.skin_points("arm", pose), ours, atol=1e-5)
 
 
 @pytest.mark.parametrize("mode", MODES)
