@@ -108,11 +108,12 @@ class CoarseSpec:
 
 @dataclass(frozen=True)
 class SolveSpec:
-    """solver: a plugin's name. start: "open" (rest pose, away from the object) or "coarse". penetration: weight
-    of the depth term, 0 switches it off. limits: whether the rig's limits hold. settle: rounds of re-placing each
-    contact at its closest facing point (changes the contacts). weights: of distance, normal and prior."""
+    """solver: a plugin's name; None leaves the choice to the plugins. start: "open" (rest pose, away from the
+    object) or "coarse". penetration: weight of the depth term, 0 switches it off. limits: whether the rig's
+    limits hold. settle: rounds of re-placing each contact at its closest facing point (changes the contacts).
+    weights: of distance, normal and prior."""
 
-    solver: str = "levenberg-marquardt"
+    solver: str | None = None
     start: str = "open"
     weights: Vector = (1.0, 1.0, 10.0)
     penetration: float = 5.0
@@ -350,7 +351,7 @@ def _angles(table: Table, joint: str) -> tuple[float, ...]:
 
 def _solve(table: Table) -> SolveSpec:
     spec = SolveSpec(
-        solver=table.text("solver", "levenberg-marquardt"),
+        solver=table.text("solver", None),
         start=table.choice("start", ("open", "coarse"), "open"),
         weights=table.vector("weights", (1.0, 1.0, 10.0)),
         penetration=table.number("penetration", 5.0, at_least=0.0),

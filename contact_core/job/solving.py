@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
+from contact_core.plugins.registry import POSE_TERMS
+from contact_core.plugins.solving import solve_by_plugin
 from contact_core.pose.body import Body, PairedPoints
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.rig import Pose
@@ -42,7 +43,7 @@ def solve(job: Job, plugins: PluginManager, *, again: bool = False) -> tuple[Pos
             return False
         return job.progress(0.45 + 0.2 * share, f"Solving the pose, iteration {iteration.number}") is False
 
-    solution = plugins.get(POSE_SOLVERS, job.recipe.solve.solver).solve(problem, options, seen)
+    solution = solve_by_plugin(problem, plugins, job.recipe.solve.solver, options, seen)
     if solution.status is SolveStatus.CANCELLED:
         raise Cancelled("the job was cancelled; nothing was written.")
     return solution, solution.poses[job.manipulator.name]
