@@ -52,7 +52,7 @@ matrix: $(READY)
 test: lint typecheck pytest wheel matrix
 
 bench: $(READY)
-	@for script in benchmarks/[a-z]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
+	$(BIN)/python -m benchmarks
 
 clean:
 	rm -rf $(VENV) .venvs $(OUT) build dist site .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

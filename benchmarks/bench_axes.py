@@ -1,6 +1,6 @@
 """Default axes against axes drawn by hand: agreement and transfer distortion, for every built-in hand.
 
-    python benchmarks/axis_generators.py [--picture docs/images/axis_generators.png]
+    python benchmarks/bench_axes.py [--picture docs/images/axis_generators.png]
 
 For each patch of reference_axes.toml, painted by the disk brush, and for each generator: the angle between its
 axis and the reference (0 to 180 degrees: a wrong sign counts), how far the middles lie apart (in brush radii),
@@ -25,10 +25,10 @@ from contact_core.contact.brush import BrushGesture
 from contact_core.document.asset import Asset
 from contact_core.geometry import SurfacePoints, TriangleMesh, exact_geodesic
 from contact_core.geometry.raycast import Locator
-from contact_core.job.painting import bones_of
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, RENDERERS, SAMPLES
 from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.pose.bones import bones_of
 from contact_core.session import Session
 
 HERE = Path(__file__).parent
