@@ -1,6 +1,6 @@
 """Contact models compared, and the axis model where it is strained: folds and distortion of transfers.
 
-    python benchmarks/bench_contact_models.py
+    python benchmarks/bench_contact_models.py [--pictures docs/images]
 
 First a strip along a bent, tapered tentacle is transferred onto a pole, by three models: the axis model of this
 package; one log map from a single point (Lakshmipathy et al. 2022); and the boundary alone, traced as a closed
@@ -10,8 +10,11 @@ Then the axis model with axes that are too sparse, off the patch, outside it, an
 
 from __future__ import annotations
 
+import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -29,9 +32,17 @@ from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_chains
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import RENDERERS
+from contact_core.plugins.slots import Picture, PictureMesh
 from contact_core.testing import meshes
 
 POLE_RADIUS = 0.25
+PICTURED = (
+    "strip on a ball: axis along it, dense",
+    "  too sparse: two points",
+    "  beside it, half its length away",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,16 +74,48 @@ class Patch:
 
 
 def main() -> int:
-    compare_models()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--pictures", type=Path, metavar="DIR", help="also draw contact-models.png and axes.png there"
+    )
+    arguments = parser.parse_args()
+    models = compare_models()
     print()
-    strain_the_axis()
+    axes = strain_the_axis()
+    if arguments.pictures is not None:
+        draw(models, arguments.pictures / "contact-models.png")
+        draw(axes, arguments.pictures / "contact-axes.png")
     return 0
 
 
-def compare_models() -> None:
+def draw(pictures: Sequence[Picture], path: Path) -> None:
+    """Side by side, with the first renderer that works here."""
+    offers = PluginManager(discover=True).offers(RENDERERS)
+    working = [renderer for renderer in offers.values() if renderer.unavailable() is None]
+    max(working, key=lambda renderer: renderer.priority).render(pictures, path, size=(420 * len(pictures), 460))
+
+
+def portrait(
+    target: TriangleMesh, there: SurfacePoints, found: Distortion, caption: str, side: tuple[float, float, float]
+) -> Picture:
+    """A transferred patch on its target: blue where lengths shrank, red where they grew, black where it folds."""
+    where = there.positions(target) + 0.004 * target.bounding_box_diagonal * there.normals(target)
+    octaves = np.round(np.clip(np.nan_to_num(np.log2(found.length_ratio)), -1.0, 1.0) * 5.0) / 5.0  # (n,)
+    even, grown, shrunk = np.array([0.95, 0.85, 0.3]), np.array([0.85, 0.1, 0.1]), np.array([0.1, 0.3, 0.9])
+    batches = [(where[found.folded], (0.0, 0.0, 0.0))]
+    for amount in np.unique(octaves):
+        color = even + abs(amount) * ((grown if amount > 0.0 else shrunk) - even)
+        chosen = (octaves == amount) & ~found.folded
+        batches.append((where[chosen], (float(color[0]), float(color[1]), float(color[2]))))
+    body = PictureMesh(target, (0.3, 0.32, 0.35))
+    return Picture((body,), points=tuple(batches), camera_from=side, up=(0.0, 0.0, 1.0), caption=caption)
+
+
+def compare_models() -> list[Picture]:
     """The tentacle-to-cylinder transfer."""
+    pictures = []
     tentacle, strip, picks = painted_tentacle()
-    pole = meshes.cylinder(48, 60, POLE_RADIUS, 6.0)
+    pole = meshes.cylinder(48, 50, POLE_RADIUS, 4.8)
     patch = Patch.painted(tentacle, strip, picks)
     print(f"tentacle to pole: {len(strip)} points, axis of {len(patch.axis)}, {patch.shape.axis.length:.2f} long")
     print(f"{'heading':>8s} {'model':22s} {'folds':>7s} {'length x':>9s} {'area x':>8s}  remarks")
@@ -82,9 +125,13 @@ def compare_models() -> None:
         print_row(f"{degrees:d} deg", "axis", patch.distortion(pole, ours.points), f"{int(ours.ran_off.sum())} off")
         single = single_point(patch, pole, ours)
         print_row("", "single-point log map", patch.distortion(pole, single), "")
+        if degrees == 30:
+            for title, there in (("axis", ours.points), ("single-point log map", single)):
+                pictures.append(portrait(pole, there, patch.distortion(pole, there), title, (1.0, 0.6, 0.35)))
         gap, crossings, area = boundary_model(patch, pole, ours)
         print(f"{'':8s} {'boundary alone':22s} {'-':>7s} {'-':>9s} {area:8.2f}  gap {100 * gap:.1f}% of the loop,"
               f" {crossings} self-crossings; no point answers another")  # fmt: skip
+    return pictures
 
 
 def single_point(patch: Patch, target: TriangleMesh, placed: PatchPoints) -> SurfacePoints:
@@ -114,8 +161,10 @@ def boundary_model(patch: Patch, target: TriangleMesh, placed: PatchPoints) -> t
     return gap, crossings(flat), abs(polygon_area(flat)) / area.area
 
 
-def strain_the_axis() -> None:
+def strain_the_axis() -> list[Picture]:
     """Distortion for axes that the paper warns of, and for the cure of each."""
+    pictures: list[Picture] = []
+    front = (0.8, 0.9, 0.45)
     print(f"{'case':46s} {'folds':>7s} {'length x':>9s} {'area x':>8s}")
     plane, ball, saddle = meshes.plane(40, 2.0), meshes.icosphere(5, 0.6), meshes.saddle(40)
     root = ball_root(ball)
@@ -133,7 +182,10 @@ def strain_the_axis() -> None:
     for title, (picks, dense) in axes.items():
         patch = Patch.painted(plane, strip, on_plane(plane, np.array(picks)), dense=dense)
         placed = reconstruct_patch(ball, patch.shape, root, mirrored=True)
-        print_row(None, title, patch.distortion(ball, placed.points, reference), "")
+        found = patch.distortion(ball, placed.points, reference)
+        print_row(None, title, found, "")
+        if title in PICTURED:
+            pictures.append(portrait(ball, placed.points, found, title.strip(), front))
     angle, radius = rng.uniform(0.3, 2 * np.pi - 0.3, 400), rng.uniform(0.4, 0.6, 400)
     ring = on_plane(plane, 1.0 + np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
     arc = np.linspace(0.35, 2 * np.pi - 0.35, 24)
@@ -145,7 +197,11 @@ def strain_the_axis() -> None:
         "  axis across the gap, outside it": Patch.painted(plane, ring, outside),
     }.items():
         placed = reconstruct_patch(ball, patch.shape, root, mirrored=True)
-        print_row(None, title, good.distortion(ball, placed.points), "")
+        found = good.distortion(ball, placed.points)
+        print_row(None, title, found, "")
+        middle = placed.points.positions(ball).mean(axis=0)
+        below = (float(middle[0]), float(middle[1]), float(middle[2]))
+        pictures.append(portrait(ball, placed.points, found, title.strip(), below))
     for title, target, where in (
         ("strip, curvature mismatch: ball of half its size", meshes.icosphere(5, 0.3), root),
         ("  saddle", saddle, middle_root(saddle)),
@@ -153,6 +209,7 @@ def strain_the_axis() -> None:
     ):
         placed = reconstruct_patch(target, reference.shape, where, mirrored=True)
         print_row(None, title, reference.distortion(target, placed.points), f"{int(placed.ran_off.sum())} off")
+    return pictures
 
 
 def print_row(heading: str | None, title: str, found: Distortion, remark: str) -> None:
