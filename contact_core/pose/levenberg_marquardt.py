@@ -35,8 +35,10 @@ class LevenbergMarquardt:
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
     ) -> PoseSolution:
+        options = options or SolveOptions()
+        options.check_settings(self.name)
         with one_blas_thread():
-            return self._solve(problem, options or SolveOptions(), progress)
+            return self._solve(problem, options, progress)
 
     def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress | None) -> PoseSolution:
         run = Run(self.name, problem, progress)

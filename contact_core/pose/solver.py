@@ -78,6 +78,13 @@ class SolveOptions:
                 f" {self.tolerance}."
             )
 
+    def check_settings(self, solver: str, known: tuple[str, ...] = ()) -> None:
+        """Raises InvalidInput when `more` holds a setting that a solver does not know."""
+        unknown = sorted(set(self.more) - set(known))
+        if unknown:
+            listed = ", ".join(known) or "none"
+            raise InvalidInput(f"{solver} has no setting {unknown[0]!r}; its settings: {listed}.")
+
 
 @runtime_checkable
 class PoseSolver(Protocol):

@@ -200,10 +200,12 @@ class SolverContract(Contract):
         assert later.value <= later.start_value
 
     def test_s16_refuses_in_words(self, solver: PoseSolver, options: SolveOptions) -> None:
-        """A problem without contacts is InvalidInput with a sentence."""
-        with pytest.raises(InvalidInput) as refusal:
-            solver.solve(replace(small(), contacts=()), options)
-        assert len(str(refusal.value).split()) >= 5
+        """A problem without contacts, and a setting it does not have, are InvalidInput with a sentence."""
+        misspelt = replace(options, more={**options.more, "misspelt": 1})
+        for problem, settings in ((replace(small(), contacts=()), options), (small(), misspelt)):
+            with pytest.raises(InvalidInput) as refusal:
+                solver.solve(problem, settings)
+            assert len(str(refusal.value).split()) >= 5
 
     def test_s17_leaves_its_input_alone(self, solver: PoseSolver, options: SolveOptions) -> None:
         """The arrays of the problem are the same bits afterwards."""

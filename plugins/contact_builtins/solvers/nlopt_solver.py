@@ -33,6 +33,7 @@ class NLoptSolver:
     ) -> PoseSolution:
         nlopt = _nlopt()
         options = options or SolveOptions(max_iterations=2000)
+        options.check_settings(self.name, ("algorithm", "preset"))
         algorithm, paper = _settings(nlopt, options)
         if paper:
             problem = replace(problem, form="paper")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
@@ -28,11 +30,12 @@ class StagedSolver:
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
     ) -> PoseSolution:
         options = options or SolveOptions()
+        options.check_settings(self.name, ("stages",))
         given = options.more.get("stages")
         if given is not None and not isinstance(given, (list, tuple)):
             raise InvalidInput(f"the setting stages is a list of stages, but {type(given).__name__} came.")
         stages = [Stage.parse(stage) for stage in given] if given else [roots_first(problem), Stage(name="all")]
-        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, options, progress)
+        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, replace(options, more={}), progress)
 
 
 class ProgressiveSolver:
@@ -48,6 +51,7 @@ class ProgressiveSolver:
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
     ) -> PoseSolution:
         options = options or SolveOptions()
+        options.check_settings(self.name, ("steps",))
         depths = {contact.name: carrier_depths(problem, contact.name) for contact in problem.contacts}
         levels = np.unique(np.concatenate(list(depths.values()))) if depths else np.zeros(1, np.int64)
         steps = int(options.more.get("steps", len(levels)))
@@ -65,7 +69,7 @@ class ProgressiveSolver:
             )
             for end in ends
         ]
-        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, options, progress)
+        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, replace(options, more={}), progress)
 
 
 class MultiStartSolver:
@@ -80,8 +84,10 @@ class MultiStartSolver:
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
     ) -> PoseSolution:
+        options = options or SolveOptions()
+        options.check_settings(self.name, ("starts",))
         with one_blas_thread():
-            return self._solve(problem, options or SolveOptions(), progress)
+            return self._solve(problem, options, progress)
 
     def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress | None) -> PoseSolution:
         starts = int(options.more.get("starts", 32))
