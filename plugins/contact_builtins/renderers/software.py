@@ -23,6 +23,7 @@ OVERSAMPLE = 2
 _KEY_LIGHT = np.array([-0.45, 0.65, 0.75]) / np.linalg.norm([-0.45, 0.65, 0.75])  # camera axes
 _TOP, _BOTTOM = np.array([0.97, 0.97, 0.98]), np.array([0.84, 0.86, 0.89])  # background
 _INK, _ALARM = np.array([0.13, 0.15, 0.19]), np.array([0.78, 0.10, 0.10])
+NEAR = 0.02  # of the distance from eye to centre: what is nearer is not drawn
 _CHUNK = 4_000_000  # fragments drawn at a time
 
 
@@ -83,17 +84,22 @@ class _Canvas:
         shade = _shade(item.mesh.vertex_normals @ self.camera.camera_from_world.T)  # (n,)
         base = np.asarray(item.color) if item.vertex_colors is None else item.vertex_colors
         colors = np.clip(np.broadcast_to(base, projected.shape) * shade[:, None], 0, 1)  # (n, 3)
-        corners = projected[item.mesh.faces]  # (m, 3, 3)
-        low = np.floor(corners[:, :, :2].min(axis=1)).astype(np.int64)  # (m, 2)
-        span = np.ceil(corners[:, :, :2].max(axis=1)).astype(np.int64) - low + 1  # (m, 2)
+        frame = np.array([self.width, self.height])
+        in_front = (
+            projected[item.mesh.faces, 2] > NEAR * np.linalg.norm(self.camera.eye - self.camera.centre)
+        ).all(axis=1)
+        faces = item.mesh.faces[in_front]
+        corners = projected[faces]  # (m, 3, 3)
+        low = np.floor(np.clip(corners[:, :, :2].min(axis=1), 0, frame)).astype(np.int64)  # (m, 2), in the frame
+        span = np.ceil(np.clip(corners[:, :, :2].max(axis=1), 0, frame)).astype(np.int64) - low  # (m, 2)
+        seen = (span > 0).all(axis=1)
+        faces, corners, low, span = faces[seen], corners[seen], low[seen], span[seen]
         side = 1 << np.ceil(np.log2(np.clip(span.max(axis=1), 1, 8192))).astype(np.int64)  # (m,)
         for extent in np.unique(side):  # triangles of one size class share one grid of pixel offsets
             members = np.flatnonzero(side == extent)
             for start in range(0, len(members), max(1, _CHUNK // int(extent) ** 2)):
                 chosen = members[start : start + max(1, _CHUNK // int(extent) ** 2)]
-                self._triangles(
-                    corners[chosen], colors[item.mesh.faces[chosen]], low[chosen], int(extent), item.opacity
-                )
+                self._triangles(corners[chosen], colors[faces[chosen]], low[chosen], int(extent), item.opacity)
 
     def _triangles(
         self, corners: FloatArray, colors: FloatArray, low: IntArray, extent: int, opacity: float

@@ -1,0 +1,261 @@
+"""The job on the built-in samples: what it writes, that it is repeatable, and how it refuses."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contact_builtins.demos import demo_names, demo_recipe
+from contact_core.document.schema import parse_document
+from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInput
+from contact_core.job.assets import convex_hull
+from contact_core.job.painting import paint
+from contact_core.job.recipe import AssetSource, PatchSpec, PointSpec, Recipe, RootSpec
+from contact_core.job.run import Job, perform, run, target
+from contact_core.job.scene import posed_skin
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.slots import Picture
+from contact_core.testing.meshes import icosphere, torus
+
+
+@cache
+def plugins() -> PluginManager:
+    return PluginManager()
+
+
+@cache
+def demo(name: str = "mug") -> Job:
+    return perform(demo_recipe(name), plugins())
+
+
+@pytest.mark.parametrize("name", demo_names())
+def test_every_demo_is_what_it_says(name: str) -> None:
+    job = demo(name)
+    assert job.verdict.is_grasp == (name != "bad"), job.verdict.failures
+    assert job.start_distance >= job.length
+    assert job.metrics["contacts"] >= 300
+
+
+def test_the_demo_keeps_grasp() -> None:
+    """The row of the acceptance table: built-in hand on built-in mug, depth against the filled mug too."""
+    job = demo()
+    most = {
+        "mean_contact_distance": 2.0,
+        "p95_contact_distance": 4.5,
+        "gap": 1.3,
+        "max_penetration": 1.8,
+        "skin_inside": 3.0,
+    }
+    least = {"opposed_normals": 92, "opposed_normals_45": 60, "worst_patch_opposed_45": 20}
+    assert all(100 * job.metrics[key] <= limit for key, limit in most.items())
+    assert all(100 * job.metrics[key] >= limit for key, limit in least.items())
+    assert job.metrics["bones_through"] == 0 and job.metrics["skin_stretch_p99"] < 1.6
+    assert job.metrics["max_joint_change_deg"] <= 120
+    names = " ".join(job.metrics["patches"])
+    assert all(digit in names for digit in ("palm", "thumb", "index", "middle", "ring", "little"))
+    assert len(job.solids) == 2
+
+
+def test_the_bad_demo_names_what_failed() -> None:
+    verdict = demo("bad").verdict
+    assert verdict.failed_patches and any("penetration" in failure for failure in verdict.failures)
+
+
+class Sketch:
+    """A renderer that keeps what it was given and writes a token."""
+
+    name = "sketch"
+    priority = 10_000
+
+    def __init__(self) -> None:
+        self.pictures: list[Picture] = []
+
+    def unavailable(self) -> str | None:
+        return None
+
+    def render(self, pictures: Any, path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
+        self.pictures = list(pictures)
+        path.write_bytes(b"drawn")
+
+
+class Broken(Sketch):
+    name = "broken"
+    priority = 20_000
+
+    def render(self, pictures: Any, path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
+        raise FileRefused("libEGL is missing")
+
+
+class Plugin:
+    """Offers renderers above all others."""
+
+    def __init__(self, *renderers: Sketch) -> None:
+        from contact_core.plugins import hookimpl
+
+        self.contact_renderers = hookimpl(lambda: list(renderers), specname="contact_renderers")
+
+
+def with_renderers(*renderers: Sketch) -> PluginManager:
+    return PluginManager([Plugin(*renderers)])
+
+
+def test_a_job_writes_its_files_and_they_can_be_read_again(tmp_path: Path) -> None:
+    sketch = Sketch()
+    manager = with_renderers(Broken(), sketch)
+    told: list[tuple[float, str]] = []
+    result = run(demo_recipe("alien"), tmp_path / "out", plugins=manager, progress=lambda f, t: told.append((f, t)))
+    names = {"document.json", "pose.json", "posed.glb", "picture.png", "report.json"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names == {p.name for p in result.files.values()}
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report == json.loads(json.dumps(dict(result.report)))
+    assert report["renderer"] == "sketch" and any("libEGL is missing" in note for note in report["notes"])
+    assert set(report["seconds"]) >= {"read", "parameterize", "transfer", "solve", "render"}
+    assert {"dofs", "iterations", "status", "verdict", "definitions"} <= set(report)
+    assert set(report["definitions"]) >= set(report["limits"])
+    fractions = [fraction for fraction, _ in told]
+    assert fractions == sorted(fractions) and fractions[-1] == 1.0
+
+    document = parse_document((tmp_path / "out" / "document.json").read_bytes(), "document.json")
+    pose = json.loads((tmp_path / "out" / "pose.json").read_text())
+    stored = document.poses["manipulator"]
+    for name, local in zip(stored.joints, stored.local, strict=True):
+        np.testing.assert_array_equal(pose["joints"][name], local)
+    assert len(document.pairs) == len(report["patches"])
+
+    before, after = sketch.pictures
+    assert len(before.points) == len(after.points) == 2 * len(report["patches"])
+    assert after.table and not before.table
+    for pair in before.lines:  # pair lines join skin and object: long before, short after
+        assert np.linalg.norm(pair[0][:, 1] - pair[0][:, 0], axis=1).min() > 0.5 * report["manipulator_length"]
+
+
+def test_the_posed_model_is_the_pose(tmp_path: Path) -> None:
+    job = demo("alien")
+    result = run(demo_recipe("alien"), tmp_path, plugins=with_renderers(Sketch()))
+    import trimesh
+
+    scene = trimesh.load(result.files["model"])
+    assert len(scene.geometry) == 2
+    skin = posed_skin(job.rig, job.pose)
+    assert any(len(mesh.faces) == len(skin.faces) for mesh in scene.geometry.values())
+
+
+def test_the_same_recipe_gives_the_same_bytes(tmp_path: Path) -> None:
+    manager = with_renderers(Sketch())
+    for place in ("one", "two"):
+        run(demo_recipe("alien"), tmp_path / place, plugins=manager)
+    for name in ("document.json", "pose.json", "posed.glb"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+@pytest.mark.parametrize("stop", [0.0, 0.3, 0.45])
+def test_cancelling_writes_nothing(tmp_path: Path, stop: float) -> None:
+    with pytest.raises(Cancelled, match="nothing was written"):
+        run(
+            demo_recipe("alien"),
+            tmp_path / "out",
+            plugins=with_renderers(Sketch()),
+            progress=lambda fraction, _: fraction < stop,
+        )
+    assert not (tmp_path / "out").exists()
+
+
+def test_explicit_roots_and_headings_are_used_as_given() -> None:
+    """Two patches with a place of their own: by direction, and by a second point to aim at."""
+    recipe = demo_recipe("alien")
+    root = PointSpec(position=(0.03, 0.62, 0.0))
+    by_direction = RootSpec(root, direction=(0.0, 1.0, 0.0))
+    by_aim = RootSpec(root, aim=PointSpec(position=(0.03, 0.70, 0.0)))
+    for place in (by_direction, by_aim):
+        first, *others = recipe.patches
+        job = perform(replace(recipe, patches=(replace(first, place=place), *others)), plugins())
+        axis = job.session.axis(target(first.name)).points.positions(job.object.mesh)
+        assert np.linalg.norm(axis[0] - [0.03, 0.62, 0.0]) < 3e-3
+        way = axis[-1] - axis[0]
+        assert way[1] / np.linalg.norm(way) > 0.95
+        assert first.name not in job.placement.placed
+
+
+def _patched(recipe: Recipe, **changes: Any) -> Recipe:
+    return replace(recipe, patches=(replace(recipe.patches[0], **changes),))
+
+
+REFUSALS: dict[str, tuple[Any, str]] = {
+    "a manipulator without bones": (
+        lambda r: replace(r, manipulator=AssetSource(sample="mug")), "has no skeleton"
+    ),
+    "an unknown sample": (lambda r: replace(r, manipulator=AssetSource(sample="tail")), "tail"),
+    "a file that is nowhere": (
+        lambda r: replace(r, manipulator=AssetSource(file="nowhere.glb")), "nowhere.glb is not beside the recipe"
+    ),
+    "an unknown joint": (
+        lambda r: _patched(r, disk=replace(r.patches[0].disk, at=PointSpec(joint="thumb_dist"))), "near names"
+    ),
+    "a vertex that does not exist": (lambda r: _patched(r, disk=None, vertices=(10**6,)), "has vertices 0..3816"),
+    "an unknown generator": (lambda r: _patched(r, generator="vertical"), "there is no axis generator 'vertical'"),
+    "an unknown placer": (lambda r: replace(r, placer="magic"), "there is no placer 'magic'"),
+    "a misspelt setting": (
+        lambda r: replace(r, placer_options={**r.placer_options, "thumbs": "x"}), "did you mean 'thumb'"
+    ),
+    "a pattern without joints": (
+        lambda r: replace(r, placer_options={**r.placer_options, "close": ["toe*"]}), "no joint of .* matches 'toe"
+    ),
+    "an approach that misses": (
+        lambda r: replace(r, coarse=replace(r.coarse, object_center=(5.0, 0, 0))), "passes the object"
+    ),
+    "a coarse pose of no joint": (lambda r: replace(r, coarse=replace(r.coarse, pose={"toe": (3.0,)})), "toe"),
+    "too many angles": (
+        lambda r: replace(r, coarse=replace(r.coarse, pose={"thumb_tip": (3.0, 2.0)})), "has 0 angles, but 2 came"
+    ),
+    "nothing near": (
+        lambda r: replace(r, placer_options={**r.placer_options, "far": 1e-9}), "the hand is not near the object"
+    ),
+    "an unknown solver": (lambda r: replace(r, solve=replace(r.solve, solver="guess")), "there is no pose solver"),
+    "a wrong solver setting": (
+        lambda r: replace(r, solve=replace(r.solve, options={"candidates": ["luck"]})), "candidates are some of"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSALS)
+def test_what_cannot_be_done_is_a_sentence(case: str, tmp_path: Path) -> None:
+    change, says = REFUSALS[case]
+    with pytest.raises(ContactError, match=says):
+        run(change(demo_recipe("alien")), tmp_path / "out", plugins=plugins())
+    assert not (tmp_path / "out").exists()
+
+
+def test_settling_moves_contacts_and_never_happens_unasked() -> None:
+    recipe = demo_recipe("alien")
+    settled = perform(replace(recipe, solve=replace(recipe.solve, settle=1)), plugins())
+    plain = demo("alien")
+    labels = [step.command.label() for step in settled.session.history.steps]
+    assert any(label.startswith("Translate") for label in labels)
+    assert not any(step.command.label().startswith("Translate") for step in plain.session.history.steps)
+    assert settled.metrics["gap"] <= 1.2 * plain.metrics["gap"]
+
+
+def test_a_hull_holds_all_points_and_looks_outwards() -> None:
+    mesh = torus()
+    hull = convex_hull(mesh)
+    centre = hull.points[np.unique(hull.faces)].mean(axis=0)
+    middles = hull.points[hull.faces].mean(axis=1)
+    assert (np.einsum("mi,mi->m", hull.face_normals, middles - centre) > 0).all()
+    low = convex_hull(icosphere(3), high=(1.0, 1.0, 0.0))
+    assert low.points[:, 2].max() <= 0.0
+    with pytest.raises(InvalidInput, match=r"hull_box leaves 0 points"):
+        convex_hull(mesh, low=(50.0, 50.0, 50.0))
+
+
+def test_a_patch_by_file_vertices_uses_the_files_own_numbers() -> None:
+    spec = PatchSpec("a", vertices=(5, 9))
+    asset = demo("alien").manipulator
+    points = paint(spec, asset).positions(asset.mesh)
+    vertices = np.array([5, 9]) if asset.source_vertices is None else asset.source_vertices[[5, 9]]
+    np.testing.assert_allclose(points, asset.mesh.points[vertices])

@@ -1,0 +1,131 @@
+"""The software renderer against geometry: what is in front is seen, at its pixel, in its colour."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from contact_builtins.renderers.font import CELL_HEIGHT, CELL_WIDTH, text_mask
+from contact_builtins.renderers.png import encode_png
+from contact_builtins.renderers.software import OVERSAMPLE, SoftwareRenderer, draw
+from contact_core.errors import FileRefused, InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
+from contact_core.plugins.camera import camera_of
+from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.testing.meshes import icosphere, torus
+
+SIZE = (96, 72)
+RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9)
+
+
+def decoded(data: bytes) -> npt.NDArray[np.uint8]:
+    """(h, w, 3) of a PNG as `encode_png` writes it, by the specification."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    chunks, at = {}, 8
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(kind + body)
+        chunks[kind] = body
+        at += 12 + length
+    width, height = struct.unpack(">II", chunks[b"IHDR"][:8])
+    rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, 1 + 3 * width)
+    assert not rows[:, 0].any()
+    return rows[:, 1:].reshape(height, width, 3)
+
+
+def test_png_round_trip() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (7, 5, 3)).astype(np.uint8)
+    np.testing.assert_array_equal(decoded(encode_png(image)), image)
+
+
+def covered(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
+    """Pixels whose colour is strong; the background is nearly grey."""
+    return np.ptp(image.astype(int), axis=2) > 60
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (1.0, 0.4, 0.2), (0.3, -1.0, 0.1), (0.0, 1.0, 0.0)])
+@pytest.mark.parametrize("table", [(), (("a", "b", False),)])
+def test_a_pixel_is_covered_where_its_ray_hits(
+    direction: tuple[float, float, float], table: tuple[tuple[str, str, bool], ...]
+) -> None:
+    """The rasteriser agrees with the ray caster at pixel centres, up to the outline."""
+    mesh = torus()
+    picture = Picture((PictureMesh(mesh, RED),), camera_from=direction, table=table)
+    image = draw(picture, SIZE)
+    camera = camera_of(picture, SIZE[0] / SIZE[1])
+    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
+    focal = 0.5 * SIZE[1] / np.tan(camera.field_of_view / 2)
+    seen = np.stack(
+        [(x - SIZE[0] / 2 * (1 + camera.shift)) / focal, -(y - SIZE[1] / 2) / focal, -np.ones_like(x)], -1
+    )
+    rays = seen.reshape(-1, 3) @ camera.camera_from_world
+    hit = Locator.of(mesh).cast(np.tile(camera.eye, (len(rays), 1)), rays).hit.reshape(SIZE[::-1])
+    rows = slice(24, SIZE[1])  # below the table
+    assert (covered(image)[rows] != hit[rows]).mean() < 0.04
+    assert hit.mean() > 0.1
+
+
+def test_the_nearer_mesh_hides_the_farther_whatever_the_order() -> None:
+    near = PictureMesh(TriangleMesh(icosphere(2, 0.5).points + np.array([0, 0, 2.0]), icosphere(2).faces), RED)
+    far = PictureMesh(icosphere(2, 0.6), BLUE)
+    images = [draw(Picture(order, camera_from=(0, 0, 1)), SIZE) for order in ((near, far), (far, near))]
+    np.testing.assert_array_equal(images[0], images[1])
+    middle = images[0][SIZE[1] // 2, SIZE[0] // 2].astype(int)
+    assert middle[0] > 2 * middle[2]
+
+
+def test_points_and_lines_show_on_the_surface_and_hide_behind_it() -> None:
+    ball = PictureMesh(icosphere(3), (0.7, 0.7, 0.7))
+    front, back = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]])
+
+    def greens(image: npt.NDArray[np.uint8]) -> int:
+        return int((image[..., 1].astype(int) > image[..., 0].astype(int) + 60).sum())
+
+    green = (0.0, 0.9, 0.0)
+    assert greens(draw(Picture((ball,), points=((front, green),), camera_from=(0, 0, 1)), (200, 200))) > 0
+    assert greens(draw(Picture((ball,), points=((back, green),), camera_from=(0, 0, 1)), (200, 200))) == 0
+    line = np.array([[[-1.2, 0.0, 1.2], [1.2, 0.0, 1.2]]])
+    assert greens(draw(Picture((ball,), lines=((line, green),), camera_from=(0, 0, 1)), (200, 200))) > 100
+
+
+def test_focus_fills_the_frame() -> None:
+    ball = PictureMesh(icosphere(2), RED)
+    whole = covered(draw(Picture((ball,)), SIZE)).mean()
+    corner = covered(draw(Picture((ball,), focus=icosphere(1, 0.2).points), SIZE)).mean()
+    assert corner > 0.95 > whole
+
+
+def test_failed_rows_are_red_and_letters_differ() -> None:
+    ball = PictureMesh(icosphere(1), (0.5, 0.5, 0.5))
+    plain = draw(Picture((ball,), table=(("gap", "1 %", False),)), (400, 300))[:24, :100].astype(int)
+    failed = draw(Picture((ball,), table=(("gap", "1 %", True),)), (400, 300))[:24, :100].astype(int)
+    assert (failed[..., 0] - failed[..., 1]).max() > 100 > (plain[..., 0] - plain[..., 1]).max()
+    masks = {text_mask(chr(code)).tobytes() for code in range(32, 127)}
+    assert len(masks) == 95
+    assert text_mask("ab", 2).shape == (2 * CELL_HEIGHT, 4 * CELL_WIDTH)
+
+
+def test_pictures_stand_side_by_side(tmp_path: Path) -> None:
+    ball = PictureMesh(icosphere(2), RED)
+    SoftwareRenderer().render([Picture((ball,)), Picture((ball,))], tmp_path / "two.png", size=(160, 80))
+    image = decoded((tmp_path / "two.png").read_bytes())
+    assert image.shape == (80, 160, 3)
+    np.testing.assert_array_equal(image[:, :80], image[:, 80:])
+    assert OVERSAMPLE == 2
+
+
+def test_refusals(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="needs content"):
+        SoftwareRenderer().render([], tmp_path / "none.png")
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(FileRefused):
+        SoftwareRenderer().render(
+            [Picture((PictureMesh(icosphere(1), RED),))], tmp_path / "taken" / "p.png", size=(32, 32)
+        )
