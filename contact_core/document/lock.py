@@ -11,8 +11,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from contact_core.errors import FileRefused
-
 
 class DocumentLock:
     """The right to write a document and its journal. Answered by `take`; let go of by `release`."""
@@ -23,13 +21,13 @@ class DocumentLock:
 
     @classmethod
     def take(cls, document_path: Path) -> DocumentLock | str:
-        """The lock, or a sentence on who holds it. Raises FileRefused where no lock file can be made."""
+        """The lock, or a sentence on why there is none: who holds it, or that the folder cannot be written."""
         path = document_path.with_name(document_path.name + ".lock")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
-            raise FileRefused(f"cannot make the lock file {path}: {error.strerror or error}.") from error
+            return f"{path.parent} cannot be written ({error.strerror or error}); it is opened read-only here."
         if not _try_lock(file):
             os.close(file)
             return f"{document_path.name} is open in {_holder(path)}; it is opened read-only here."

@@ -21,6 +21,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading
+from contact_core.geometry.tracing import trace_chains
 from contact_core.testing import meshes
 from contact_core.testing.strategies import cached_family
 
@@ -100,6 +101,35 @@ def test_a_link_leads_back_to_the_child(family: str, seed: int, mirrored: bool) 
     assert off(mesh, point, child.points[0]) <= tolerance and cut <= tolerance
     if point.same_as(child.points[0]):  # the same frame: headings compare
         assert abs(tangent - complex(child.tangents[0])) <= 1e-6
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 10**6), angle=st.floats(-3.0, 3.0), mirrored=st.booleans())
+def test_a_child_keeps_its_place_relative_to_a_parent_that_moved(
+    family: str, seed: int, angle: float, mirrored: bool
+) -> None:
+    """Wherever the parent goes, the way back from the child has the link's lengths and angles: 1e-9."""
+    mesh = cached_family(family)
+    points = region(mesh, seed, 24, 0.3)
+    shape, parent = draw_axis(mesh, points[[20, 21]])
+    _, child = draw_axis(mesh, points[[22, 23]])
+    link = link_to(
+        mesh, "parent", parent, child.points[0], complex(child.tangents[0]), parent_point=len(parent) - 1
+    )
+    link = link.mirrored() if mirrored else link
+    moved = transported(mesh, parent.root(), points[5])
+    there = reconstruct_axis(mesh, shape, moved.heading_to(moved.heading * np.exp(1j * angle)), mirrored=mirrored)
+    point, tangent, cut = follow_link(mesh, there, link)
+    if cut > 0.0 or there.remaining.any():
+        return  # a boundary was in the way, and that is reported
+    arriving = tangent * np.exp(-1j * link.heading)
+    back = trace_chains(
+        mesh, point, [-arriving * link.lengths[-1]], [0, len(link.turns)], [-t for t in link.turns[::-1]],
+        link.lengths[-2::-1] if link.turns else [],
+    )  # fmt: skip
+    tolerance = 1e-5 if family == "sliver" else 1e-9
+    assert off(mesh, back.points, there.points[len(parent) - 1]) <= tolerance
 
 
 def flat_coordinates(mesh: TriangleMesh, points: SurfacePoints, surface: str) -> FloatArray:
