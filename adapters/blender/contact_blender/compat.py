@@ -44,6 +44,20 @@ def fcurves(owner: Any) -> Iterable[Any]:
     )
 
 
+def remove_fcurve(owner: Any, curve: Any) -> None:
+    """Take one curve of an ID's animation away."""
+    animation = owner.animation_data
+    if not hasattr(animation, "action_slot"):
+        animation.action.fcurves.remove(curve)
+        return
+    for layer in animation.action.layers:
+        for strip in layer.strips:
+            bag = strip.channelbag(animation.action_slot)
+            if bag is not None and bag.fcurves.find(curve.data_path, index=curve.array_index) == curve:
+                bag.fcurves.remove(curve)
+                return
+
+
 def forget_action(owner: Any, action_name: str) -> None:
     """Unassign and remove an action that a step made and did not keep; the object's drivers stay."""
     animation = owner.animation_data

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contact_blender import compat, evaluation, exporter, fidelity, poses, selection, storage
+from contact_blender import compat, evaluation, exporter, fidelity, keys, poses, selection, storage
 from contact_blender import mesh as meshes
 from contact_blender import rig as rigs
 from contact_blender.compat import bpy
@@ -165,12 +165,12 @@ class BlenderHost(
         local = unstretch_pose(pose, placement.surface_from_local)
         armature_id = self._ids.id_of(armature)
         with self.step("Pose"):
-            put_back = poses.remember(armature)
+            put_back = poses.remember(armature, pose.joints, frame)
             self._undo.wrote(lambda: put_back(self._ids.resolve(armature_id)))
             poses.write_pose(armature, local, frame)
 
     def pose_keys(self, object_id: str) -> tuple[float, ...]:
-        return poses.key_frames(self._rigged(object_id)[1])
+        return keys.frames(self._rigged(object_id)[1])
 
     # The document
 

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from contact_blender import compat
+from contact_blender import keys
 from contact_blender.channels import read_basis, snapshot, write_basis
 from contact_blender.evaluation import graph_at
 from contact_blender.rig import UNMOVED, Skeleton, read_skeleton
@@ -53,100 +53,36 @@ def write_pose(armature: Any, pose: Pose, frame: float | None) -> None:
     at another frame than the current one leaves what is seen now to the animation. Raises InvalidInput, with the
     channels as they were.
     """
-    before = {pose_bone.name: snapshot(pose_bone) for pose_bone in armature.pose.bones}
+    bones = armature.pose.bones
+    before = {name: snapshot(bones[name]) for name in pose.joints if name in bones}
     written: dict[str, tuple[str, ...]] = {}
     try:
         for name, basis in bases_of(read_skeleton(armature), pose, armature.name).items():
-            written[name] = write_basis(armature.pose.bones[name], basis)
+            written[name] = write_basis(bones[name], basis)
     except InvalidInput:
         for name, restore in before.items():
-            restore(armature.pose.bones[name])
+            restore(bones[name])
         raise
-    scene = bpy.context.scene
-    if frame is not None:
-        _key(armature, written, float(frame), only_available=False)
-        if float(frame) != scene.frame_current_final:
-            _show_animation(armature, written, scene.frame_current_final)
-    elif scene.tool_settings.use_keyframe_insert_auto:
-        available = bpy.context.preferences.edit.use_keyframe_insert_available
-        _key(armature, written, float(scene.frame_current_final), only_available=available)
+    at = keys.key_frame(frame)
+    if at is not None:
+        keys.insert(armature, written, at, by_auto_key=frame is None)
+    if at is not None and at != bpy.context.scene.frame_current_final:
+        keys.show_animation(armature, written)
     armature.update_tag(refresh={"OBJECT"})
 
 
-def key_frames(armature: Any) -> tuple[float, ...]:
-    """Frames with a key on any bone, ascending."""
-    curves = (curve for curve in compat.fcurves(armature) if curve.data_path.startswith("pose.bones"))
-    return tuple(sorted({round(float(key.co[0]), 4) for curve in curves for key in curve.keyframe_points}))
+def remember(armature: Any, bones: Iterable[str], frame: float | None) -> Callable[[Any], None]:
+    """What puts the channels and keys of bones back, given the armature anew: for a step that fails.
 
-
-def remember(armature: Any) -> Callable[[Any], None]:
-    """What puts channels and keys of all bones back, given the armature anew: for a step that fails."""
-    channels = {pose_bone.name: snapshot(pose_bone) for pose_bone in armature.pose.bones}
-    animation = armature.animation_data
-    action = animation.action.name if animation is not None and animation.action is not None else None
-    keys = {_curve_id(curve): _keys_of(curve) for curve in compat.fcurves(armature)}
+    Keys are looked at only where a pose written at `frame` sets some.
+    """
+    channels = {name: snapshot(armature.pose.bones[name]) for name in bones if name in armature.pose.bones}
+    put_keys = keys.remember(armature, channels) if keys.key_frame(frame) is not None else None
 
     def restore(again: Any) -> None:
         for name, put_channels in channels.items():
             put_channels(again.pose.bones[name])
-        now = again.animation_data.action if again.animation_data is not None else None
-        if action is None:
-            if now is not None:
-                compat.forget_action(again, now.name)
-            if animation is None:
-                again.animation_data_clear()
-            return
-        for curve in compat.fcurves(again):
-            _put_keys(curve, keys.get(_curve_id(curve), ()))
+        if put_keys is not None:
+            put_keys(again)
 
-    animation = None if animation is None else True  # the fact, not the Blender object
     return restore
-
-
-def _key(armature: Any, written: dict[str, tuple[str, ...]], frame: float, *, only_available: bool) -> None:
-    """`keyframe_insert` makes action, slot and curves by itself, alike on every version."""
-    there = {curve.data_path for curve in compat.fcurves(armature)} if only_available else set()
-    for name, channels in written.items():
-        pose_bone = armature.pose.bones[name]
-        for channel in channels:
-            if not only_available or pose_bone.path_from_id(channel) in there:
-                pose_bone.keyframe_insert(channel, frame=frame, group=name)
-
-
-def _show_animation(armature: Any, written: dict[str, tuple[str, ...]], frame: float) -> None:
-    """Set the written channels to what their curves say at the current frame."""
-    paths = {armature.pose.bones[name].path_from_id(channel): (name, channel)
-             for name, channels in written.items() for channel in channels}  # fmt: skip
-    for curve in compat.fcurves(armature):
-        if curve.data_path in paths:
-            name, channel = paths[curve.data_path]
-            getattr(armature.pose.bones[name], channel)[curve.array_index] = curve.evaluate(frame)
-
-
-def _curve_id(curve: Any) -> tuple[str, int]:
-    return str(curve.data_path), int(curve.array_index)
-
-
-_KEY_FIELDS = ("co", "handle_left", "handle_right")
-
-
-def _keys_of(curve: Any) -> tuple[tuple[Any, ...], ...]:
-    """The keys of a curve as plain values."""
-    return tuple(
-        (k.handle_left_type, k.handle_right_type, k.interpolation, *(tuple(getattr(k, f)) for f in _KEY_FIELDS))
-        for k in curve.keyframe_points
-    )
-
-
-def _put_keys(curve: Any, keys: Iterable[tuple[Any, ...]]) -> None:
-    """Give a curve exactly these keys."""
-    wanted = tuple(keys)
-    if _keys_of(curve) == wanted:
-        return
-    curve.keyframe_points.clear()
-    curve.keyframe_points.add(len(wanted))
-    for point, (left, right, interpolation, *places) in zip(curve.keyframe_points, wanted, strict=True):
-        point.handle_left_type, point.handle_right_type, point.interpolation = left, right, interpolation
-        for name, place in zip(_KEY_FIELDS, places, strict=True):
-            setattr(point, name, place)
-    curve.update()

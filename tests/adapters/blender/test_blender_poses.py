@@ -127,6 +127,9 @@ def test_auto_key_is_honoured(bpy: Any, arm: Any, only_available: bool) -> None:
         bones(bpy)["elbow"].keyframe_insert("rotation_quaternion", frame=2)
         arm.write_pose("arm", bent(rig, 2))
         assert arm.pose_keys("arm") == (2.0, 7.0)
+        arm.write_pose("arm", bent(rig, 3), 15.0)  # asked for by name: all bones
+        bpy.context.scene.frame_set(15)
+        assert pose_error(arm.read_pose("arm"), bent(rig, 3)) < 1e-5
     finally:
         tools.use_keyframe_insert_auto = edit.use_keyframe_insert_available = False
 
@@ -171,3 +174,34 @@ def test_scale_of_bones_is_kept_and_keyed_when_it_changes(bpy: Any, arm: Any) ->
 
     keyed = {curve.data_path for curve in fcurves(bpy.data.objects["arm"].parent)}
     assert [path for path in keyed if path.endswith("scale")] == ['pose.bones["elbow"].scale']
+
+
+def test_a_failed_step_leaves_every_key_as_it_was(bpy: Any, arm: Any) -> None:
+    """Over an animation of some bones, with handles and interpolations of its own: values, handles, curves."""
+    import blender_scenes
+
+    rig = arm.read_rig("arm").rig
+    elbow = rig.joint_index("elbow")
+    for frame, seed in ((1.0, 1), (9.0, 2), (20.0, 3)):
+        arm.write_pose("arm", Pose(("elbow",), bent(rig, seed).local[elbow : elbow + 1]), frame)
+    from contact_blender.compat import fcurves
+
+    curves = list(fcurves(bpy.data.objects["arm"].parent))
+    for k, curve in enumerate(curves):
+        for key in curve.keyframe_points:
+            key.interpolation = ("BEZIER", "LINEAR", "CONSTANT")[k % 3]
+            key.handle_left_type = key.handle_right_type = ("FREE", "VECTOR", "AUTO_CLAMPED")[k % 3]
+        curve.keyframe_points[1].handle_right[1] += 0.3
+        curve.update()
+
+    def handles() -> Any:
+        found = fcurves(bpy.data.objects["arm"].parent)
+        return [[(tuple(k.co), tuple(k.handle_left), tuple(k.handle_right), k.handle_left_type, k.handle_right_type,
+                  k.interpolation) for k in curve.keyframe_points] for curve in found]  # fmt: skip
+
+    before = blender_scenes.whole_state(), handles()
+    for frame in (9.0, 5.0, None):
+        with pytest.raises(ZeroDivisionError), arm.step("fails"):
+            arm.write_pose("arm", bent(rig, 7), frame)
+            raise ZeroDivisionError
+        assert (blender_scenes.whole_state(), handles()) == before

@@ -1,0 +1,124 @@
+"""Keys of pose bones: set by `keyframe_insert`, which is alike on every version, and taken back exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+import bpy
+import numpy as np
+
+from contact_blender import compat
+
+Written = Mapping[str, tuple[str, ...]]  # channels that were set, by bone
+_FIELDS = {  # of a key: numbers each, and their kind
+    "co": (2, np.float32),
+    "handle_left": (2, np.float32),
+    "handle_right": (2, np.float32),
+    "handle_left_type": (1, np.int32),
+    "handle_right_type": (1, np.int32),
+    "interpolation": (1, np.int32),
+}
+
+
+def key_frame(frame: float | None) -> float | None:
+    """Where a pose written at `frame` is keyed: for None at the current frame when Blender's auto-key is on."""
+    scene = bpy.context.scene
+    if frame is None and scene.tool_settings.use_keyframe_insert_auto:
+        return float(scene.frame_current_final)
+    return None if frame is None else float(frame)
+
+
+def insert(armature: Any, written: Written, frame: float, *, by_auto_key: bool) -> None:
+    """Key the channels; auto-key's own "only available" preference holds where auto-key is what keys."""
+    only_available = by_auto_key and bpy.context.preferences.edit.use_keyframe_insert_available
+    there = {curve.data_path for curve in compat.fcurves(armature)} if only_available else set()
+    for name, channels in written.items():
+        pose_bone = armature.pose.bones[name]
+        for channel in channels:
+            if not only_available or pose_bone.path_from_id(channel) in there:
+                pose_bone.keyframe_insert(channel, frame=frame, group=name)
+
+
+def show_animation(armature: Any, written: Written) -> None:
+    """Set channels that were keyed elsewhere to what their curves say at the current frame."""
+    frame = bpy.context.scene.frame_current_final
+    channel_of = _paths(armature, written)
+    for curve in compat.fcurves(armature):
+        if curve.data_path in channel_of:
+            name, channel = channel_of[curve.data_path]
+            getattr(armature.pose.bones[name], channel)[curve.array_index] = curve.evaluate(frame)
+
+
+def frames(armature: Any) -> tuple[float, ...]:
+    """Frames with a key on any bone, ascending."""
+    found: set[float] = set()
+    for curve in compat.fcurves(armature):
+        if curve.data_path.startswith("pose.bones"):
+            found.update(np.round(_keys_of(curve)["co"].reshape(-1, 2)[:, 0].astype(float), 4).tolist())
+    return tuple(sorted(found))
+
+
+def remember(armature: Any, bones: Collection[str]) -> Callable[[Any], None]:
+    """What puts the keys of bones back, given the armature anew; an action made since goes again."""
+    animation = armature.animation_data
+    had_animation = animation is not None
+    had_action = animation is not None and animation.action is not None
+    before = {_id(curve): _keys_of(curve) for curve in _curves(armature, bones)}
+
+    def restore(again: Any) -> None:
+        if not had_action:
+            now = again.animation_data.action if again.animation_data is not None else None
+            if now is not None:
+                compat.forget_action(again, now.name)
+            if not had_animation:
+                again.animation_data_clear()
+            return
+        for curve in _curves(again, bones):
+            if _id(curve) in before:
+                _put_keys(curve, before[_id(curve)])
+            else:
+                compat.remove_fcurve(again, curve)
+
+    return restore
+
+
+def _paths(armature: Any, written: Written) -> dict[str, tuple[str, str]]:
+    """Bone and channel by data path."""
+    bones = armature.pose.bones
+    return {
+        bones[name].path_from_id(channel): (name, channel)
+        for name, channels in written.items()
+        for channel in channels
+    }
+
+
+def _curves(armature: Any, bones: Collection[str]) -> list[Any]:
+    """The curves of some bones; for immediate use."""
+    starts = tuple(armature.pose.bones[name].path_from_id() + "." for name in bones)
+    return [curve for curve in compat.fcurves(armature) if curve.data_path.startswith(starts)]
+
+
+def _id(curve: Any) -> tuple[str, int]:
+    return str(curve.data_path), int(curve.array_index)
+
+
+def _keys_of(curve: Any) -> dict[str, Any]:
+    """The keys of a curve as flat arrays by field."""
+    points = curve.keyframe_points
+    values = {name: np.empty(width * len(points), dtype) for name, (width, dtype) in _FIELDS.items()}
+    for name, array in values.items():
+        points.foreach_get(name, array)
+    return values
+
+
+def _put_keys(curve: Any, wanted: dict[str, Any]) -> None:
+    """Give a curve exactly these keys."""
+    now = _keys_of(curve)
+    if all(np.array_equal(now[name], wanted[name]) for name in _FIELDS):
+        return
+    curve.keyframe_points.clear()
+    curve.keyframe_points.add(len(wanted["interpolation"]))
+    for name in ("handle_left_type", "handle_right_type", "interpolation", "co", "handle_left", "handle_right"):
+        curve.keyframe_points.foreach_set(name, wanted[name])
+    curve.update()
