@@ -195,6 +195,10 @@ def test_rest_may_differ_from_bind_and_scale_is_taken_out(tmp_path: Path) -> Non
     blend = sum(w / weights.sum() * m for w, m in zip(weights, moves, strict=True))
     expected = np.array([[0, 0, 0, 1], [1, 0, 0, 1], [0, 1, 0, 1]]) @ blend.T
     assert np.allclose(asset.mesh.points[asset.mesh.points[:, 2] < 100], expected[:, :3], atol=1e-3)
+    rides = raw[1] @ np.array(
+        [[0, 1, 0], [0, 0, 1], [2, 2, 2], [1, 1, 1]]
+    )  # the rider stands where its node stands
+    assert np.allclose(asset.mesh.points[asset.mesh.points[:, 2] > 100], rides.T[:, :3], atol=1e-3)
 
 
 def test_joint_names_become_unique(tmp_path: Path) -> None:

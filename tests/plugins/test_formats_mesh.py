@@ -29,7 +29,7 @@ def concave_prism() -> tuple[np.ndarray, list[list[int]]]:
     """A prism over the concave pentagon: 2 pentagons and 5 quads, volume 20."""
     points = np.concatenate([CONCAVE, CONCAVE + np.array([0, 0, 2])])
     sides = [[i, (i + 1) % 5, 5 + (i + 1) % 5, 5 + i] for i in range(5)]
-    return points, [[4, 3, 2, 1, 0], [5, 6, 7, 8, 9], *sides]
+    return points, [*sides, [4, 3, 2, 1, 0], [5, 6, 7, 8, 9]]
 
 
 def as_obj(points: np.ndarray, faces: list[list[int]]) -> bytes:

@@ -121,6 +121,25 @@ def test_flips_and_collapses_keep_the_manifold(seed: int) -> None:
     assert collapsed.is_watertight and collapsed.genus == 1 and collapsed.vertices < before.vertices
 
 
+def test_a_thin_ring_is_never_pinched() -> None:
+    """Three vertices round the tube: no face joins them, so none of their edges may collapse."""
+    ring = meshes.torus(24, 3)
+    points, faces = np.array(ring.points), np.array(ring.faces)
+    for _ in range(12):
+        points, faces = collapse_short_edges(points, faces, 10.0)
+    facts = report(TriangleMesh(points, faces))
+    assert facts.is_watertight and facts.genus == 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(x=st.floats(-0.4, 1.4), y=st.floats(-0.4, 1.4), height=st.floats(0.001, 0.5))
+def test_a_flip_never_doubles_an_edge(x: float, y: float, height: float) -> None:
+    """In a tetrahedron each edge that a flip would make is there already, however flat it is."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [x, y, height]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    assert np.array_equal(flip_towards_delaunay(points, faces), faces)
+
+
 def test_bone_heat_on_a_rod_is_even_and_ordered() -> None:
     """Two bones in a rod: weights are 1 at its ends, a half in the middle, and fall without a bump."""
     rod = meshes.cylinder(16, 40)

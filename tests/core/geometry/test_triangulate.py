@@ -68,6 +68,15 @@ def test_shared_edges_stay_shared(seed: int) -> None:
     assert np.isclose(volume.sum() / 6, np.linalg.norm(vector_area(base)))
 
 
+def test_a_dart_is_not_cut_along_its_shorter_outer_diagonal() -> None:
+    """A quad whose diagonal outside of it is the shorter one, from each of its corners."""
+    dart = np.array([[0, 0, 0], [3, -1, 0], [2.9, 0, 0], [3, 1, 0]], float)
+    for first in range(4):
+        triangles, _, _ = triangulate([4], np.roll(range(4), first), dart)
+        areas = [vector_area(dart[t])[2] for t in triangles]
+        assert min(areas) > 0 and np.isclose(sum(areas), vector_area(dart)[2])
+
+
 def test_collinear_corners_cost_no_area() -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [3, 2, 0], [1.5, 2, 0], [0, 2, 0]], float)
     triangles, _, notes = triangulate([7], range(7), points)
