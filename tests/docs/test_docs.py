@@ -132,3 +132,13 @@ def test_no_committed_file_names_a_registry() -> None:
         if path.suffix not in (".png", ".npz") and path.is_file():
             text = path.read_text(encoding="utf-8", errors="ignore")
             assert not [word for word in words if word in text], name
+
+
+SCRIPTS = sorted((ROOT / "examples").glob("[0-9]*.py"))
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
+def test_every_example_script_runs(script: Path, tmp_path: Path) -> None:
+    run = subprocess.run([sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert run.stdout.strip()
