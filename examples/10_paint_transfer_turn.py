@@ -1,4 +1,4 @@
-"""Paint a contact on a tube, give it to a pole, turn it so that it winds round, and go back through the history. No files needed."""
+"""Paint a contact on a tube, give it to a pole, turn it so that it winds round, and go back. No files needed."""
 
 import numpy as np
 
