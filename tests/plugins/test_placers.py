@@ -1,0 +1,175 @@
+"""Laws of placing: an approach ends at touch, digits close without going in, pads land where they look."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from contact_builtins.demos import demo_recipe
+from contact_builtins.placers.closing import STEP, approach, close, search_thumb
+from contact_builtins.placers.from_pose import FACING, FromPose
+from contact_builtins.placers.hand_pose import HandPose, flexion_dof, matching
+from contact_builtins.placers.naive import Naive
+from contact_builtins.placers.pads import pads_of
+from contact_core.arrays import FloatArray
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.tangent import direction_to_heading
+from contact_core.geometry.tracing import trace_geodesic
+from contact_core.job.run import Job, perform
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.slots import PlacementRequest
+from contact_core.pose.rig import Pose, skin
+from contact_core.pose.rig import forward_kinematics as forward
+
+UP = np.array([0.0, 0.0, 1.0])  # the palm of the built-in hands looks along +z
+
+
+@cache
+def job() -> Job:
+    return perform(demo_recipe("alien"), PluginManager())
+
+
+def request(options: dict[str, object] | None = None) -> PlacementRequest:
+    """The alien hand open beside the pole."""
+    done = job()
+    names = list(done.metrics["patches"])
+    return PlacementRequest(
+        rig=done.rig,
+        pose=Pose.rest(done.rig),
+        object_mesh=done.object.mesh,
+        object_from_rig=np.asarray(np.linalg.inv(done.placed)),
+        patch_points={name: done.session.points(name) for name in names},
+        patch_axes={name: done.session.axis(name).points for name in names},
+        options=done.recipe.placer_options if options is None else options,
+        solids=done.solids,
+    )
+
+
+def approached() -> HandPose:
+    hand = HandPose(request())
+    approach(hand, UP, matching(hand.rig, ("thumb*",), "test"))
+    return hand
+
+
+def test_the_hand_pose_skins_as_the_rig_does() -> None:
+    hand = approached()
+    pose = hand.pose()
+    points = skin(hand.rig, forward(hand.rig.parents, pose.local))
+    into_object = hand.object_from_rig
+    np.testing.assert_allclose(hand.points(), points @ into_object[:3, :3].T + into_object[:3, 3], atol=1e-12)
+
+
+@pytest.mark.parametrize("start", [-0.2, 0.0, 0.05, 0.3])
+def test_an_approach_ends_at_the_first_touch_wherever_it_starts(start: float) -> None:
+    hand = HandPose(request())
+    hand.shift = start * UP
+    thumb = matching(hand.rig, ("thumb*",), "test")
+    approach(hand, 7.0 * UP, thumb)
+    tested = np.flatnonzero(~np.isin(hand.owner, thumb))
+    spacing = hand.fields[0].spacing
+    assert 0.0 <= hand.clearance(tested).min() < 0.2 * spacing
+    np.testing.assert_allclose(hand.shift, approached().shift, atol=0.2 * spacing)
+
+
+def test_closing_stops_at_touch_within_limits_and_moves_nothing_else() -> None:
+    hand = approached()
+    before = hand.theta.copy()
+    deepest = hand.clearance().min()
+    digit = matching(hand.rig, ("index*",), "test")
+    close(hand, digit)
+    dofs = [dof for joint in digit if (dof := flexion_dof(hand.chart, int(joint))) is not None]
+    others = np.setdiff1d(np.arange(len(before)), dofs)
+    np.testing.assert_array_equal(hand.theta[others], before[others])
+    assert (hand.theta[dofs] >= before[dofs]).all() and (hand.theta[dofs] > before[dofs]).any()
+    assert (hand.theta[dofs] <= np.maximum(hand.chart.upper[dofs], before[dofs]) + 1e-12).all()
+    reach = 0.2  # metres: longer than any finger, so one step goes no deeper than this
+    assert hand.clearance().min() > deepest - reach * STEP * len(dofs)
+    mine = hand.vertices_of(digit)
+    assert hand.clearance(mine).min() < 0.01  # it did arrive
+
+
+def test_in_the_air_a_digit_closes_to_its_limits() -> None:
+    hand = HandPose(request())
+    hand.shift = -5.0 * UP
+    digit = matching(hand.rig, ("index*",), "test")
+    dofs = [dof for joint in digit if (dof := flexion_dof(hand.chart, int(joint))) is not None]
+    hand.chart.upper[dofs] = 0.6
+    close(hand, digit)
+    moved = hand.theta[dofs]
+    np.testing.assert_allclose(moved, 0.6)  # the slow last joint goes on alone after the others
+
+
+def test_the_thumb_search_is_never_worse_than_leaving_the_thumb_open() -> None:
+    hand = approached()
+    for pattern in ("index*", "middle*"):
+        close(hand, matching(hand.rig, (pattern,), "test"))
+    thumb = matching(hand.rig, ("thumb*",), "test")
+    pads = [points for name, points in request().patch_points.items() if name.startswith("thumb")]
+    before = np.abs(hand.distance(pads[0].positions(hand.skin()))).mean()
+    search_thumb(hand, thumb, pads)
+    assert np.abs(hand.distance(pads[0].positions(hand.skin()))).mean() <= before
+    assert hand.clearance(hand.vertices_of(thumb)).min() > -0.02
+
+
+def test_pads_land_on_faces_that_face_them_and_the_middle_of_the_axis_comes_there() -> None:
+    ask = request()
+    result = FromPose().place(ask)
+    assert result.pose is not None and not result.left_out
+    hand = HandPose(replace(ask, pose=result.pose))
+    for name, pad in pads_of(ask, hand).items():
+        placed = result.placed[name]
+        heading = direction_to_heading(ask.object_mesh, placed.root, placed.direction[None])
+        middle = trace_geodesic(ask.object_mesh, placed.root, heading * pad.to_root).points
+        assert pad.normal @ ask.object_mesh.face_normals[middle.faces[0]] <= FACING + 1e-9
+        assert np.linalg.norm(middle.positions(ask.object_mesh)[0] - pad.centre) < 0.06 * job().length + 1e-6
+        assert abs(np.linalg.norm(placed.direction) - 1.0) < 1e-9
+
+
+def turned(ask: PlacementRequest) -> tuple[PlacementRequest, FloatArray]:
+    """The same scene with the object's own space moved rigidly."""
+    generator = np.random.default_rng(3)
+    moved = np.eye(4)
+    moved[:3, :3] = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+    moved[:3, :3] *= np.linalg.det(moved[:3, :3])
+    moved[:3, 3] = generator.normal(size=3)
+    assert np.linalg.det(moved) == pytest.approx(1.0)
+
+    def carried(mesh: TriangleMesh) -> TriangleMesh:
+        return TriangleMesh(mesh.points @ moved[:3, :3].T + moved[:3, 3], mesh.faces)
+
+    mesh = carried(ask.object_mesh)
+    return replace(ask, object_mesh=mesh, object_from_rig=moved @ ask.object_from_rig, solids=(mesh,)), moved
+
+
+def test_placing_does_not_depend_on_where_the_object_has_its_origin() -> None:
+    """Closest points are equivariant; the distance field's grid is not, by less than two of its cells."""
+    ask = request({"approach": [0, 0, 1], "without": ["thumb*"]})
+    other, moved = turned(ask)
+    here, there = Naive().place(ask), Naive().place(other)
+    cell = HandPose(ask).fields[0].spacing
+    for name, placed in here.placed.items():
+        point = placed.root.positions(ask.object_mesh)[0] @ moved[:3, :3].T + moved[:3, 3]
+        assert np.linalg.norm(point - there.placed[name].root.positions(other.object_mesh)[0]) < 2.0 * cell
+
+
+def test_pads_out_of_reach_are_left_out_and_named_with_their_distance() -> None:
+    ask = request({"approach": [0, 0, 1], "without": ["thumb*"], "far": 0.02})
+    result = FromPose().place(ask)
+    assert set(result.placed) | set(result.left_out) == set(ask.patch_axes)
+    assert result.left_out and all("% of the length away" in why for why in result.left_out.values())
+    with pytest.raises(InvalidInput, match="leaves out every part"):
+        FromPose().place(request({"approach": [0, 0, 1], "without": ["*"]}))
+
+
+def test_the_naive_placer_leaves_the_fingers_open() -> None:
+    result = Naive().place(request({"approach": [0, 0, 1], "without": ["thumb*"]}))
+    rig = job().rig
+    assert result.pose is not None
+    inner = rig.parents >= 0
+    np.testing.assert_allclose(result.pose.local[inner], rig.rest_local[inner], atol=1e-12)
+    with pytest.raises(InvalidInput, match="'close'"):
+        Naive().place(request({"close": ["index*"]}))
