@@ -13,8 +13,7 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_usd.mesh import gf_matrix, matrix_of
 
-TRACKS = ("translations", "rotations", "scales")
-ROUNDING = 1e-3  # scales are stored in half precision
+ROUNDING = 1e-3  # relative; scales are stored in half precision, which rounds by less than half of this
 
 
 def local_pose(
@@ -47,17 +46,16 @@ def write(
     """
     _check_scales(local, str(skeleton.GetPath()))
     query = cache.GetSkelQuery(skeleton)
-    path = skeleton.GetPrim().GetPath()
-    make_editable(stage, path)
-    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath(path))
-    path = path.GetParentPath().AppendChild(f"{path.name}_ContactPose")
+    place = skeleton.GetPrim().GetPath()
+    path = place.GetParentPath().AppendChild(f"{place.name}_ContactPose")
+    make_editable(stage, place)
     animation = UsdSkel.Animation.Get(stage, path)
     if not animation:
         animation = UsdSkel.Animation.Define(stage, path)
         animation.CreateJointsAttr(query.GetJointOrder())
         _copy_source(query, animation)
-        binding = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
-        binding.CreateAnimationSourceRel().SetTargets([path])
+    binding = UsdSkel.BindingAPI.Apply(stage.GetPrimAtPath(place))  # again each time: somebody may have unbound it
+    binding.CreateAnimationSourceRel().SetTargets([path])
     time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
     animation.SetTransforms(Vt.Matrix4dArray([gf_matrix(m) for m in local]), time)
 
@@ -96,11 +94,11 @@ def _standing_time(prim: Usd.Prim) -> Usd.TimeCode:
 def _check_scales(local: FloatArray, path: str) -> None:
     """SkelAnimation holds scales in half precision and no shear: refuse what would not come back."""
     scales = np.linalg.norm(local[:, :3, :3], axis=1)  # (j, 3) of the columns
-    off = np.abs(scales - scales.astype(np.float16)).max(initial=0.0)
+    off = np.abs(scales.astype(np.float16) - scales) - ROUNDING * scales  # (j, 3) above 0 where too much is lost
     shear = np.einsum("jia,jib->jab", local[:, :3, :3], local[:, :3, :3])
     shear = np.abs(shear - np.eye(3) * np.diagonal(shear, axis1=1, axis2=2)[:, None, :]).max(initial=0.0)
-    if off > ROUNDING or shear > ROUNDING:
+    if off.max(initial=-1.0) > 0.0 or not scales.all() or shear > ROUNDING:
         raise InvalidInput(
-            f"a pose of {path} has sheared joints (by {shear:.2g}) or scales that half precision rounds by"
-            f" {off:.2g}; a SkelAnimation cannot hold it."
+            f"a pose of {path} has sheared joints (by {shear:.2g}) or scales out of the range of half"
+            f" precision ({scales.min():.3g} to {scales.max():.3g}); a SkelAnimation cannot hold it."
         )

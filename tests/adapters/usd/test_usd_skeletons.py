@@ -213,3 +213,28 @@ def test_names_and_freedoms_survive_an_export(tmp_path: Path) -> None:
         assert (ours.kind, ours.order, ours.translates) == (theirs.kind, theirs.order, theirs.translates)
         for field in ("frame", "lower", "upper", "prior_weight", "locked"):
             np.testing.assert_array_equal(getattr(ours, field), getattr(theirs, field))
+
+
+def test_what_an_animation_cannot_hold_is_refused(source: Path) -> None:
+    host = UsdHost(source)
+    before = host.layer.ExportToString()
+    sheared, tiny, flat = (bent(arm_rig(), 1).local.copy() for _ in range(3))
+    flat[2, :3, 0] = 0.0
+    sheared[1, 0, 1] += 0.5
+    tiny[1, :3, :3] *= 1e-7
+    for local in (sheared, tiny, flat):
+        with pytest.raises(InvalidInput, match="cannot hold"):
+            host.write_pose(ARM, Pose(arm_rig().joints, local))
+    assert host.layer.ExportToString() == before and not host.undo()
+
+
+def test_a_pose_shows_although_somebody_bound_another_animation(source: Path) -> None:
+    host = UsdHost(source)
+    rig = arm_rig()
+    host.write_pose(ARM, bent(rig, 1))
+    with Usd.EditContext(host.stage, host.layer):
+        UsdSkel.Animation.Define(host.stage, "/World/arm_root/other")
+        binding = UsdSkel.BindingAPI(host.stage.GetPrimAtPath(ARM))
+        binding.GetAnimationSourceRel().SetTargets(["/World/arm_root/other"])
+    host.write_pose(ARM, bent(rig, 2))
+    assert pose_error(host.read_pose(ARM), bent(rig, 2)) < 1e-5
