@@ -66,14 +66,3 @@ def forget_action(owner: Any, action_name: str) -> None:
     action = bpy.data.actions.get(action_name)
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)
-
-
-def select_bone(pose_bone: Any, selected: bool) -> None:
-    """A pose bone's selection: on the pose bone from 5.0 on, on the bone before."""
-    holder = pose_bone if hasattr(pose_bone, "select") else pose_bone.bone
-    holder.select = selected
-
-
-def is_bone_selected(pose_bone: Any) -> bool:
-    holder = pose_bone if hasattr(pose_bone, "select") else pose_bone.bone
-    return bool(holder.select)

@@ -32,56 +32,59 @@ class ObjectIds:
 
     def __init__(self) -> None:
         self._held: dict[str, Held] = {}
+        self._id_of_uid: dict[int, str] = {}
+        self._id_of_name: dict[tuple[str, str], str] = {}  # by last name and library
+        self._used: set[str] = set()
 
     def id_of(self, scene_object: Any) -> str:
         """The id of an object, made at first sight and the same from then on."""
         held = _held(scene_object)
-        for object_id, known in self._held.items():
-            if known.session_uid == held.session_uid:
-                self._held[object_id] = held
-                return object_id
-        for object_id, known in self._held.items():  # the same object after its file was loaded again
-            if (known.name, known.library) == (held.name, held.library) and _by_uid(known) is None:
-                self._held[object_id] = held
-                return object_id
-        return self.bind(_free(_spelt(held), self._held), scene_object)
+        known = self._id_of_uid.get(held.session_uid)
+        if known is None:  # new, or the same object after its file was loaded again
+            known = self._id_of_name.get((held.name, held.library))
+            if known is not None and _by_uid(self._held[known]) is not None:
+                known = None
+        return self._hold(_free(_spelt(held), self._held) if known is None else known, held)
 
-    def bind(self, object_id: str, scene_object: Any) -> str:
+    def bind(self, object_id: str, scene_object: Any) -> None:
         """Let an id mean this object, as a stored document says."""
-        self._held[object_id] = _held(scene_object)
-        return object_id
+        self._hold(object_id, _held(scene_object))
+        self._used.add(object_id)
 
     def resolve(self, object_id: str) -> Any:
         """The Blender object of an id, for immediate use. Raises InvalidInput naming near ids."""
         held = self._held.get(object_id)
-        fresh = bpy.data.objects.get((object_id, None)) if held is None else None
-        if fresh is not None and self.id_of(fresh) == object_id:
-            return fresh
-        found = None if held is None else _by_uid(held) or self._returned(held)
-        if held is not None and found is not None:
-            self._held[object_id] = _held(found)
-            return found
-        there = [_spelt(_held(each)) for each in bpy.data.objects]
-        near = difflib.get_close_matches(object_id, there, n=3) or there[:5]
-        raise InvalidInput(f"Blender has no object {object_id!r}; there are: {', '.join(near) or 'none'}.")
-
-    def _returned(self, held: Held) -> Any:
-        """The object that has the lost one's name, unless it is known as another."""
-        named = _by_name(held)
-        others = {known.session_uid for known in self._held.values()}
-        return None if named is None or named.session_uid in others else named
-
-    def forget(self) -> None:
-        """After another file was loaded: every id starts anew."""
-        self._held.clear()
+        if held is None:
+            fresh = bpy.data.objects.get((object_id, None))
+            found = fresh if fresh is not None and self.id_of(fresh) == object_id else None
+        else:
+            found = _by_uid(held) or self._returned(held)
+        if found is None:
+            there = [_spelt(_held(each)) for each in bpy.data.objects]
+            near = difflib.get_close_matches(object_id, there, n=3) or there[:5]
+            raise InvalidInput(f"Blender has no object {object_id!r}; there are: {', '.join(near) or 'none'}.")
+        self._hold(object_id, _held(found))
+        self._used.add(object_id)
+        return found
 
     def pairs(self, wanted: Iterable[str] | None = None) -> Iterator[tuple[str, Any]]:
-        """(id, object) of the ids that still have an object, for immediate use."""
-        for object_id in tuple(self._held if wanted is None else wanted):
+        """(id, object) of the ids that still have an object, for immediate use; None: of those ever asked for."""
+        for object_id in sorted(self._used) if wanted is None else tuple(wanted):
             held = self._held.get(object_id)
             found = None if held is None else _by_uid(held)
             if found is not None:
                 yield object_id, found
+
+    def _hold(self, object_id: str, held: Held) -> str:
+        self._held[object_id] = held
+        self._id_of_uid[held.session_uid] = object_id
+        self._id_of_name[held.name, held.library] = object_id
+        return object_id
+
+    def _returned(self, held: Held) -> Any:
+        """The object that has the lost one's name, unless it is known as another."""
+        named = _by_name(held)
+        return None if named is None or named.session_uid in self._id_of_uid else named
 
 
 def _held(scene_object: Any) -> Held:

@@ -20,7 +20,6 @@ class UndoBridge:
 
     def __init__(self) -> None:
         self._depth = 0
-        self._written = False
         self._undo_of_writes: list[Callable[[], None]] = []
         self._listeners: list[Callable[[], None]] = []
         self._failure: Exception | None = None
