@@ -14,32 +14,17 @@ from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.pose.black_box import BlackBoxChart, BlackBoxMotion
-from contact_core.pose.body import Body, PairedPoints, manipulator_length, uniform_scale
+from contact_core.pose.body import Body, PairedPoints
 from contact_core.pose.chart import Chart, Motion
+from contact_core.pose.extent import length_of
+from contact_core.pose.pairs import Pairs, pairs_of
 from contact_core.pose.rig import Pose
-from contact_core.pose.skinning import Track, normal_track, point_track, watched_track
+from contact_core.pose.skinning import Track
 from contact_core.pose.state import PoseState
 from contact_core.pose.terms import BoundTerm, PoseTerm, paper_terms
 
 Form = Literal["squares", "paper"]
 Limits = Literal["rig", "none", "paper"]
-
-
-@dataclass(frozen=True, eq=False)
-class Pairs:
-    """All contact pairs of a problem, one below the other.
-
-    manipulator_points, object_points, and their normals: the two ends. gap: the first minus the second.
-    weights: (k,) sum 1. rows: which rows are whose.
-    """
-
-    manipulator_points: Track
-    object_points: Track
-    manipulator_normals: Track
-    object_normals: Track
-    gap: Track
-    weights: FloatArray
-    rows: Mapping[str, slice]
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,30 +236,7 @@ class PoseProblem:
         """Largest rest extent of the skin that the free joints drive, world units (over all bodies)."""
         if self.length is not None:
             return float(self.length)
-        lengths = [
-            manipulator_length(body.rig, self._driven(index)) * uniform_scale(body.world_from_rig)
-            for index, body in enumerate(self.bodies)
-            if len(self.free_of_body[index]) and len(body.rig.joints) > 1
-        ]
-        lengths += [body.black_box.world_length for body in self.bodies if body.black_box is not None]
-        lengths = [length for length in lengths if length > 0.0]
-        if not lengths:  # only rigid things move
-            lengths = [
-                manipulator_length(body.rig) * uniform_scale(body.world_from_rig)
-                for index, body in enumerate(self.bodies)
-                if len(self.free_of_body[index])
-            ]
-        return max(lengths, default=1.0) or 1.0
-
-    def _driven(self, index: int) -> IntArray:
-        """Joints that the free dofs of a body move, and where several chains hang from one joint, that joint."""
-        chart = self.charts[index]
-        driven: BoolArray = np.any(chart.moves[self.free_of_body[index]], axis=0)
-        parents = chart.rig.parents[driven]
-        tops = parents[(parents >= 0) & ~driven[parents]]
-        shared, count = np.unique(tops, return_counts=True)
-        driven[shared[count > 1]] = True
-        return np.flatnonzero(driven)
+        return length_of(self)
 
     @cached_property
     def unit(self) -> float:
@@ -303,40 +265,7 @@ class PoseProblem:
     @cached_property
     def pairs(self) -> Pairs:
         """The contact pairs as tracks."""
-        if not self.contacts:
-            raise InvalidInput("the problem has no contacts; pair at least one patch before solving.")
-        weights = np.concatenate([contact.weights for contact in self.contacts])
-        if weights.sum() <= 0.0:
-            raise InvalidInput("all contact weights are zero; give at least one point a weight.")
-        ends = np.cumsum([0, *(len(contact.weights) for contact in self.contacts)])
-        rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(self.contacts)}
-        manipulators = [(contact.manipulator, contact.manipulator_points) for contact in self.contacts]
-        objects = [(contact.object, contact.object_points) for contact in self.contacts]
-        first, first_normals = self._tracks(manipulators, as_object=False)
-        second, second_normals = self._tracks(objects, as_object=True)
-        gap = first.combined(second, -1.0)
-        return Pairs(first, second, first_normals, second_normals, gap, weights / weights.sum(), rows)
-
-    def _tracks(self, ends: Sequence[tuple[str, SurfacePoints]], *, as_object: bool) -> tuple[Track, Track]:
-        """Points and normals of one end of all pairs; what lies on one body is blended in one go."""
-        owner = np.repeat([self.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
-        points = SurfacePoints.concatenate([points for _, points in ends])
-        order, tracks, normals = [], [], []
-        for index in np.unique(owner):
-            rows = np.flatnonzero(owner == index)
-            rig, first = self.bodies[index].rig, int(self.bone_offsets[index])
-            order.append(rows)
-            if self.bodies[index].black_box is not None:
-                total = int(self.watched_offsets[-1])
-                end = int(self.watched_offsets[index + 1])
-                start = end - len(rows) if as_object else int(self.watched_offsets[index])
-                tracks.append(watched_track(start, len(rows), total, 4))
-                normals.append(watched_track(start, len(rows), total, 3))
-                continue
-            tracks.append(point_track(rig, points[rows], first))
-            normals.append(normal_track(rig, points[rows], first))
-        back = np.argsort(np.concatenate(order))
-        return Track.stacked(tracks).rows(back), Track.stacked(normals).rows(back)
+        return pairs_of(self)
 
     @cached_property
     def bound_terms(self) -> dict[str, BoundTerm]:

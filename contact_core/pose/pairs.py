@@ -1,0 +1,75 @@
+"""The contact pairs of a problem, one below the other, as tracks over its bones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contact_core.arrays import FloatArray
+from contact_core.errors import InvalidInput
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.skinning import Track, normal_track, point_track, watched_track
+
+if TYPE_CHECKING:
+    from contact_core.pose.problem import PoseProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """All contact pairs of a problem, one below the other.
+
+    manipulator_points, object_points, and their normals: the two ends. gap: the first minus the second.
+    weights: (k,) sum 1. rows: which rows are whose.
+    """
+
+    manipulator_points: Track
+    object_points: Track
+    manipulator_normals: Track
+    object_normals: Track
+    gap: Track
+    weights: FloatArray
+    rows: Mapping[str, slice]
+
+
+def pairs_of(problem: PoseProblem) -> Pairs:
+    """The contact pairs of a problem as tracks. Raises InvalidInput when there is nothing to pair."""
+    if not problem.contacts:
+        raise InvalidInput("the problem has no contacts; pair at least one patch before solving.")
+    weights = np.concatenate([contact.weights for contact in problem.contacts])
+    if weights.sum() <= 0.0:
+        raise InvalidInput("all contact weights are zero; give at least one point a weight.")
+    ends = np.cumsum([0, *(len(contact.weights) for contact in problem.contacts)])
+    rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(problem.contacts)}
+    manipulators = [(contact.manipulator, contact.manipulator_points) for contact in problem.contacts]
+    objects = [(contact.object, contact.object_points) for contact in problem.contacts]
+    first, first_normals = _tracks(problem, manipulators, as_object=False)
+    second, second_normals = _tracks(problem, objects, as_object=True)
+    gap = first.combined(second, -1.0)
+    return Pairs(first, second, first_normals, second_normals, gap, weights / weights.sum(), rows)
+
+
+def _tracks(
+    problem: PoseProblem, ends: Sequence[tuple[str, SurfacePoints]], *, as_object: bool
+) -> tuple[Track, Track]:
+    """Points and normals of one end of all pairs; what lies on one body is blended in one go."""
+    owner = np.repeat([problem.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
+    points = SurfacePoints.concatenate([points for _, points in ends])
+    order, tracks, normals = [], [], []
+    for index in np.unique(owner):
+        rows = np.flatnonzero(owner == index)
+        rig, first = problem.bodies[index].rig, int(problem.bone_offsets[index])
+        order.append(rows)
+        if problem.bodies[index].black_box is not None:
+            total = int(problem.watched_offsets[-1])
+            end = int(problem.watched_offsets[index + 1])
+            start = end - len(rows) if as_object else int(problem.watched_offsets[index])
+            tracks.append(watched_track(start, len(rows), total, 4))
+            normals.append(watched_track(start, len(rows), total, 3))
+            continue
+        tracks.append(point_track(rig, points[rows], first))
+        normals.append(normal_track(rig, points[rows], first))
+    back = np.argsort(np.concatenate(order))
+    return Track.stacked(tracks).rows(back), Track.stacked(normals).rows(back)
