@@ -133,7 +133,10 @@ def open_gltf(path: Path) -> Gltf:
         text, binary = _chunks(data)
     else:
         text, binary = data, b""
-    document = json.loads(text.decode("utf-8-sig"))
+    try:
+        document = json.loads(text.decode("utf-8-sig"))
+    except ValueError as error:
+        raise InvalidInput("it is neither a GLB container nor JSON text") from error
     if not isinstance(document, dict) or "asset" not in document:
         raise InvalidInput('it has no "asset" entry, which every glTF file has')
     version = str(document["asset"].get("version", ""))
