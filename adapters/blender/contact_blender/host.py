@@ -245,6 +245,11 @@ class BlenderHost(
         scene_object = self._ids.resolve(object_id)
         if scene_object.type != "MESH":
             raise InvalidInput(f"{object_id} is a {scene_object.type.lower()}; contacts lie on meshes.")
+        if not scene_object.evaluated_get(meshes.current_depsgraph()).is_evaluated:
+            raise InvalidInput(
+                f"{object_id} is disabled in viewports or excluded from the view layer, so Blender evaluates"
+                " neither its modifiers nor its place; enable it first."
+            )
         return scene_object
 
     def _rigged(self, object_id: str) -> tuple[Any, Any, Placement]:

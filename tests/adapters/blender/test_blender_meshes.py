@@ -143,3 +143,17 @@ def test_what_is_no_mesh_is_refused_in_words(bpy: Any, step: Any) -> None:
     bpy.data.objects["step"].scale.z = 0.0
     with pytest.raises(InvalidInput, match="flat"):
         step.read_surface("step")
+
+
+def test_what_blender_does_not_evaluate_is_refused_in_words(bpy: Any, step: Any) -> None:
+    """Disabled in viewports, or in an excluded collection: its modifiers and its place would be those of before."""
+    made = bpy.data.objects["step"]
+    made.modifiers.new("Row", "ARRAY")
+    made.hide_viewport = True
+    for call in (step.read_surface, step.placement):
+        with pytest.raises(InvalidInput, match="disabled in viewports"):
+            call("step")
+    made.hide_viewport = False
+    assert len(step.read_surface("step").mesh.points) > 12
+    made.hide_set(True)  # the eye alone hides it from view, not from evaluation
+    assert len(step.read_surface("step").mesh.points) > 12
