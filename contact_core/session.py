@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.document.document import ContactDocument
-from contact_core.edit.command import Command, Macro, register_command
+from contact_core.edit.command import Command, Macro, apply_command, register_command
 from contact_core.edit.derived import Derived
 from contact_core.edit.history import History, Step
 from contact_core.edit.open_document import OpenDocument
@@ -170,7 +170,7 @@ class Session(Verbs, SurfaceVerbs):
         when it cannot be recorded; then nothing has changed.
         """
         if self._macro is not None and self._macro_document is not None:
-            self._macro_document = command.apply(self._macro_document)
+            self._macro_document = apply_command(command, self._macro_document)
             self._macro.append(command)
             return self.revision
         self._check_writable()
@@ -205,6 +205,8 @@ class Session(Verbs, SurfaceVerbs):
 
     def _go(self, kind: Literal["undo", "redo", "goto"], revision: int = 0, origin: str = "user") -> int:
         self._check_writable()
+        if self._macro is not None:
+            raise CommandRejected("a macro is under way: undo comes after its end.")
         before, came_from = self.history.document, self.revision
         step: Step | None = None
         if kind == "goto":

@@ -329,6 +329,10 @@ def test_a_macro_is_one_step_or_none(session: Session) -> None:
         session.rotate("palm", 0.2)
         turned = where(session, "palm")
         session.link("thumb", "palm")
+        with pytest.raises(CommandRejected, match="macro is under way"):
+            session.undo()
+        with session.stroke() as stroke:
+            stroke.rotate("thumb", 0.1)
         with session.macro("inner"):
             session.recolor("palm", (0.0, 0.0, 0.0))
     assert len(session.history.done) == steps + 1
