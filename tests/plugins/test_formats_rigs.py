@@ -179,9 +179,12 @@ def test_joints_without_hierarchy_and_words_are_asked_for(tmp_path: Path) -> Non
     with pytest.raises(FileRefused, match=r"rig\.toml"):
         GltfFiles().read(path)
     (tmp_path / "flat.rig.toml").write_text(
-        'schema = 1\n[[joint]]\nmatch = "b"\nparent = "a"\n[[joint]]\nmatch = "c"\nparent = "b"\n'
+        'schema = 1\nmeters_per_unit = 0.01\nup_axis = "Z"\n'
+        '[[joint]]\nmatch = "b"\nparent = "a"\n[[joint]]\nmatch = "c"\nparent = "b"\n'
     )
-    rig = GltfFiles().read(path).rig
+    asset = GltfFiles().read(path)
+    assert (asset.meters_per_unit, asset.up_axis) == (0.01, "Z")
+    rig = asset.rig
     assert rig is not None and rig.joints == ("a", "b", "c") and rig.parents.tolist() == [-1, 0, 1]
 
 

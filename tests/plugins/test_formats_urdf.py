@@ -56,6 +56,18 @@ def test_hinges_limits_mimics_and_slides(tmp_path: Path) -> None:
     assert report(asset.mesh).components == 4
 
 
+def test_a_sidecar_overrides_the_file(tmp_path: Path) -> None:
+    (tmp_path / "r.rig.toml").write_text(
+        "schema = 1\nmeters_per_unit = 0.001\n"
+        '[[joint]]\nmatch = "out"\naxis = "z"\nlimits = [-10, 20]\nlock = true\n'
+    )
+    asset = read(tmp_path, PARTS)
+    assert asset.rig is not None and asset.meters_per_unit == 0.001 and asset.up_axis == "Z"
+    hinge = asset.rig.freedoms[1]
+    assert np.allclose(np.degrees([hinge.lower[0], hinge.upper[0]]), [-10, 20]) and hinge.locked.all()
+    assert np.allclose(hinge.frame[:, 0], [0, 0, 1])
+
+
 def test_a_hinge_moves_its_links_rigidly(tmp_path: Path) -> None:
     rig = read(tmp_path, PARTS).rig
     assert rig is not None

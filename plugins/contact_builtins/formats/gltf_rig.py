@@ -76,6 +76,7 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
         skin_weights=influences[picked],
         freedoms=freedoms,
         meters_per_unit=(sidecar and sidecar.meters_per_unit) or 1.0,
+        up_axis=(sidecar and sidecar.up_axis) or "Y",
     )
     off = float(np.abs(sums - 1.0).max())
     if off > 1e-3:
@@ -87,7 +88,7 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
         source_vertices=surface.source_vertices,
         source_faces=surface.source_faces,
         meters_per_unit=rig.meters_per_unit,
-        up_axis="Y",
+        up_axis=rig.up_axis,
         notes=(*notes, *left_out, *skeleton.notes, *surface.notes, *guessed),
         details={
             "format": "gltf",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class Sidecar:
     mirror: dict[str, str] = field(default_factory=dict)
     guess: bool = True
     meters_per_unit: float | None = None
-    up_axis: str | None = None
+    up_axis: Literal["X", "Y", "Z"] | None = None
 
     def parents(self, names: Sequence[str]) -> dict[str, str]:
         """Parent by joint name, for the joints that a rule gives one. Raises FileRefused on unknown parents."""

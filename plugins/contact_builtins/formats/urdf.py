@@ -37,16 +37,21 @@ class UrdfFiles:
             joints, notes = _joints_parents_first(robot)
             rig, source_faces, more = _rig(path, robot, joints)
             if told is not None:
-                freedoms = read_sidecar(told).freedoms(rig.joints, rig.freedoms)
-                rig = replace(rig, freedoms=freedoms)
+                words = read_sidecar(told)
+                rig = replace(
+                    rig,
+                    freedoms=words.freedoms(rig.joints, rig.freedoms),
+                    meters_per_unit=words.meters_per_unit or 1.0,
+                    up_axis=words.up_axis or "Z",
+                )
         mimic = {j.name: _mimic(j) for j in joints if getattr(j, "mimic", None) is not None}
         return Asset(
             name=path.stem,
             mesh=rig.surface,
             rig=rig,
             source_faces=source_faces,
-            meters_per_unit=1.0,
-            up_axis="Z",
+            meters_per_unit=rig.meters_per_unit,
+            up_axis=rig.up_axis,
             notes=(*notes, *more),
             details={"format": "urdf", "influences": 1, "weights_sum_to_1": True, "mimic": mimic},
         )
