@@ -131,7 +131,14 @@ def _members(annotation: Any) -> list[Any]:
     return [member for member in get_args(annotation) if dataclasses.is_dataclass(member)]
 
 
+def _unaliased(annotation: Any) -> Any:
+    """The type behind an alias with parameters: from numpy 2.5 on, NDArray[...] is one (PEP 695)."""
+    value = getattr(get_origin(annotation), "__value__", None)
+    return annotation if value is None else value[get_args(annotation)]
+
+
 def _decode(annotation: Any, data: Any, where: str) -> Any:
+    annotation = _unaliased(annotation)
     origin = get_origin(annotation)
     if origin in (Union, types.UnionType):
         return _decode_union(annotation, data, where)
