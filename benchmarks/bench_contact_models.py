@@ -18,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from benchmarks.harness import record
 from contact_core.arrays import ComplexArray, FloatArray
 from contact_core.contact.area import measure_area
 from contact_core.contact.axis import Axis, draw_axis, reconstruct_axis
@@ -38,6 +40,7 @@ from contact_core.plugins.slots import Picture, PictureMesh
 from contact_core.testing import meshes
 
 POLE_RADIUS = 0.25
+ROWS: dict[str, str] = {}  # what is recorded, in order
 PICTURED = (
     "strip on a ball: axis along it, dense",
     "  too sparse: two points",
@@ -82,6 +85,7 @@ def main() -> int:
     models = compare_models()
     print()
     axes = strain_the_axis()
+    record("Contact models: folds, 95th percentile of stretch in length and in area", ROWS)
     if arguments.pictures is not None:
         draw(models, arguments.pictures / "contact-models.png")
         draw(axes, arguments.pictures / "contact-axes.png")
@@ -124,7 +128,7 @@ def compare_models() -> list[Picture]:
         ours = reconstruct_patch(pole, patch.shape, root, mirrored=True)
         print_row(f"{degrees:d} deg", "axis", patch.distortion(pole, ours.points), f"{int(ours.ran_off.sum())} off")
         single = single_point(patch, pole, ours)
-        print_row("", "single-point log map", patch.distortion(pole, single), "")
+        print_row(f"{degrees:d} deg", "single-point log map", patch.distortion(pole, single), "")
         if degrees == 30:
             for title, there in (("axis", ours.points), ("single-point log map", single)):
                 pictures.append(portrait(pole, there, patch.distortion(pole, there), title, (1.0, 0.6, 0.35)))
@@ -217,6 +221,9 @@ def print_row(heading: str | None, title: str, found: Distortion, remark: str) -
     start = f"{title:46s}" if heading is None else f"{heading:>8s} {title:22s}"
     lengths, areas = spread_of(found.length_ratio), spread_of(found.area_ratio)
     print(f"{start} {found.folds:7d} {lengths:9.2f} {areas:8.2f}  {remark}".rstrip())
+    ROWS[title.strip() if heading is None else f"{title}, {heading.strip()}"] = (
+        f"{found.folds} folds, {lengths:.2f}, {areas:.2f}"
+    )
 
 
 def spread_of(ratio: FloatArray) -> float:

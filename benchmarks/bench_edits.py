@@ -19,12 +19,16 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from benchmarks.harness import record
 from contact_core.edit.commands import Rotate
 from contact_core.edit.history import History
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.session import Session
 from contact_core.testing import meshes
+
+ROWS: dict[str, str] = {}  # what is recorded, in order
 
 
 def main() -> int:
@@ -34,21 +38,21 @@ def main() -> int:
     arguments = parser.parse_args()
     mesh, name = scan(arguments.bunny)
     print(f"{name}: {len(mesh.faces)} faces, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
-    print(f"{'row':46s} {'median':>10s} {'least':>10s} {'bar':>10s}")
     single = edits(mesh, "")
     many = edits(meshes.copies(mesh, arguments.copies, 0.0), f", {arguments.copies} copies")
     for key in ("translate", "rotate", "bend"):
-        print(
-            f"{key + f', {arguments.copies} copies / one':46s} {many[key] / single[key]:9.2f}x {'':10s} {1.5:9.2f}x"
+        ROWS[f"{key}, {arguments.copies} copies over one, by the least"] = (
+            f"{many[key] / single[key]:.2f}x (bar 1.5x)"
         )
     tree(mesh)
     history_memory()
+    record(f"Edits through the session, journal on: {name}", ROWS)
     return 0
 
 
 def edits(mesh: TriangleMesh, note: str) -> dict[str, float]:
-    """Rows for one patch of 500 points; answers medians in seconds."""
-    medians: dict[str, float] = {}
+    """Rows for one patch of 500 points; answers the least times in seconds."""
+    least: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder, Session.open(Path(folder) / "d.json", discover=False) as session:
         session.add_surface("scan", mesh)
         points = disk(mesh, 500, 0.05)
@@ -62,7 +66,7 @@ def edits(mesh: TriangleMesh, note: str) -> dict[str, float]:
             "bend": lambda k: session.bend("p", 3, 0.02),
         }
         for key, action in actions.items():
-            medians[key] = row(f"{key}, 500 points{note}", action, bars[key])
+            least[key] = row(f"{key}, 500 points{note}", action, bars[key])
         row(f"undo{note}", lambda k: session.undo(), 1e-4, warm=0)
         row(f"redo{note}", lambda k: session.redo(), 1e-4, warm=0)
 
@@ -72,7 +76,7 @@ def edits(mesh: TriangleMesh, note: str) -> dict[str, float]:
 
         row(f"transfer, 500 points{note}", transfer, 2e-3)
         session.close(discard=True)
-    return medians
+    return least
 
 
 def tree(mesh: TriangleMesh) -> None:
@@ -114,11 +118,11 @@ def history_memory() -> None:
         history.do(command)
     used = (tracemalloc.get_traced_memory()[0] - before) / 1e6
     tracemalloc.stop()
-    print(f"{'10,000 edits on 30 patches':46s} {used:7.1f} MB {'':10s} {50.0:7.1f} MB")
+    ROWS["10,000 edits on 30 patches"] = f"{used:.1f} MB (bar 50 MB)"
 
 
 def row(title: str, action: Callable[[int], object], bar: float, *, count: int = 40, warm: int = 3) -> float:
-    """Time an action, print its row, answer the median in seconds."""
+    """Time an action, keep its row, answer the least time in seconds."""
     taken = []
     for k in range(count):
         start = time.perf_counter()
@@ -126,8 +130,8 @@ def row(title: str, action: Callable[[int], object], bar: float, *, count: int =
         taken.append(time.perf_counter() - start)
     kept = taken[warm:]
     median = float(np.median(kept))
-    print(f"{title:46s} {1e3 * median:7.3f} ms {1e3 * min(kept):7.3f} ms {1e3 * bar:7.3f} ms")
-    return median
+    ROWS[title] = f"{1e3 * median:.3f} ms, least {1e3 * min(kept):.3f} (bar {1e3 * bar:g} ms)"
+    return min(kept)
 
 
 def disk(mesh: TriangleMesh, count: int, reach: float, seed: int = 0) -> SurfacePoints:
