@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, MissingExtra
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.host import (
     DocumentStorage,
@@ -30,6 +29,12 @@ from contact_core.host import (
 )
 from contact_core.pose.rig import Pose
 from contact_core.scene_reading import fit_to_scene, stretch_pose, unstretch_pose
+
+try:
+    from pxr import Sdf, Usd, UsdGeom, UsdSkel
+except ImportError as error:
+    raise MissingExtra("The USD host", "usd") from error
+
 from contact_usd import export, mesh, poses, registration, skel, stage_io, storage
 from contact_usd.layer import LayerUndo
 
