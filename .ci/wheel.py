@@ -66,7 +66,7 @@ def main() -> None:
         scripts = scratch / "venv" / ("Scripts" if os.name == "nt" else "bin")
         run(scripts / "python", "-m", "pip", "install", "--quiet", wheel, cwd=scratch)
         run(scripts / "python", "-c", USE.format(packages=list(PACKAGES)), cwd=scratch)
-        run(scripts / "contact", "plugins", cwd=scratch)
+        run(scripts / "contact", "plugins", "--check", cwd=scratch)
 
 
 if __name__ == "__main__":
