@@ -25,7 +25,8 @@ from contact_core.job.assets import object_mesh, read_source, solids_of
 from contact_core.job.metrics import Contact, PosedScene, bone_segments, measure
 from contact_core.job.outputs import write_outputs
 from contact_core.job.painting import axis_picks, explicit_root, paint
-from contact_core.job.recipe import Recipe, load_recipe
+from contact_core.job.recipe import Recipe
+from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.report import Verdict, judge
 from contact_core.job.scene import away_pose, coarse_pose, posed_skin, posed_world, world_from_object
 from contact_core.job.solving import solve

@@ -7,11 +7,11 @@ import re
 from pathlib import Path
 
 from contact_builtins.placers import from_pose
-from contact_core.job import recipe
+from contact_core.job import recipe_reader
 
 
 def test_every_key_is_documented_and_no_other(repository: Path) -> None:
-    source = inspect.getsource(recipe) + inspect.getsource(from_pose)
+    source = inspect.getsource(recipe_reader) + inspect.getsource(from_pose)
     calls = r"\.(?:raw|text|choice|flag|number|count|vector|vectors|texts|counts|table|tables)\(\s*\"(\w+)\""
     known = set(re.findall(calls, source))
     known |= {

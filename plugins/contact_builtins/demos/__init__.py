@@ -6,7 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from contact_core.errors import InvalidInput
-from contact_core.job.recipe import Recipe, parse_recipe
+from contact_core.job.recipe import Recipe
+from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import JobProgress, JobResult, run
 from contact_core.plugins.manager import PluginManager
 

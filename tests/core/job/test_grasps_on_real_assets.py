@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from contact_core.job.recipe import load_recipe
+from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import Job, perform
 from contact_core.plugins.manager import PluginManager
 

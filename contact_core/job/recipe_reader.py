@@ -1,0 +1,246 @@
+"""Reading recipes: TOML in, a checked `Recipe` out, each mistake a sentence with file, table and key."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from contact_core.errors import ContactError, FileRefused, InvalidInput
+from contact_core.job.recipe import (
+    ACCEPT,
+    AssetSource,
+    CoarseSpec,
+    DiskSpec,
+    ObjectSpec,
+    PatchSpec,
+    PointSpec,
+    Recipe,
+    RootSpec,
+    SolveSpec,
+    ViewSpec,
+)
+from contact_core.job.table import Table
+
+SCHEMA = 1
+_LARGEST_FILE = 4_000_000  # bytes
+
+
+def load_recipe(path: Path) -> Recipe:
+    """Read a recipe file. Raises FileRefused, InvalidInput; each message begins with the file's name."""
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise FileRefused(f"{path} is larger than {_LARGEST_FILE} bytes: too large for a recipe.")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise FileRefused(f"cannot read the recipe {path}: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise FileRefused(f"{path} is no recipe: it is not UTF-8 text.") from error
+    return parse_recipe(text, name=path.name, folder=path.parent)
+
+
+def parse_recipe(text: str, *, name: str, folder: Path | None = None) -> Recipe:
+    """A recipe out of TOML text. Raises InvalidInput naming the table and key."""
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInput(f"{name} is not TOML: {error}.") from error
+    except RecursionError as error:
+        raise InvalidInput(f"{name} is nested too deeply for a recipe.") from error
+    try:
+        return _recipe(Table(values, "recipe"), folder)
+    except ContactError as error:
+        raise type(error)(f"{name}: {error}") from error
+
+
+def _recipe(top: Table, folder: Path | None) -> Recipe:
+    schema = top.count("schema", at_least=1, at_most=10**6)
+    if schema > SCHEMA:
+        raise InvalidInput(
+            f"it has recipe schema {schema}; this contact-core reads up to {SCHEMA}. Update contact-core."
+        )
+    scene = top.table("scene", None)
+    placer = top.table("placer", None)
+    recipe = Recipe(
+        name=top.text("name"),
+        title=top.text("title", ""),
+        manipulator=_source(top.table("manipulator"), sidecar=True),
+        object=_object(top.table("object")),
+        patches=tuple(spec for table in top.tables("patch") for spec in _patches(table)),
+        away=scene.number("away", 1.25, at_least=0.0, at_most=100.0),
+        away_direction=scene.vector("direction", None, direction=True),
+        coarse=_coarse(top.table("coarse", None)),
+        placer=placer.text("name", "from pose"),
+        placer_options={key: placer.raw(key) for key in placer.values if key != "name"},
+        solve=_solve(top.table("solve", None)),
+        accept=_accept(top.table("accept", None)),
+        view=_view(top.table("view", None)),
+        folder=folder,
+    )
+    scene.done()
+    top.done()
+    names = [patch.name for patch in recipe.patches]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidInput(f"patch names must be unique, but {twice!r} comes twice.")
+    return recipe
+
+
+def _source(table: Table, *, sidecar: bool = False, done: bool = True) -> AssetSource:
+    kind = table.exactly_one("file", "sample")
+    value, digest = table.text(kind), table.text("sha256", None)
+    if digest is not None and (
+        kind != "file" or len(digest) != 64 or set(digest.lower()) - set("0123456789abcdef")
+    ):
+        raise InvalidInput(f"{table.where}.sha256 must be 64 hex digits and goes with a file.")
+    beside = table.text("rig", None) if sidecar else None
+    if done:
+        table.done()
+    if kind == "sample":
+        return AssetSource(sample=value, sidecar=beside)
+    return AssetSource(file=value, sha256=digest and digest.lower(), sidecar=beside)
+
+
+def _object(table: Table) -> ObjectSpec:
+    solids = table.texts("solids", ("surface",))
+    for kind in solids:
+        if kind not in ("surface", "hull"):
+            raise InvalidInput(f"{table.where}.solids holds 'surface' and 'hull', but {kind!r} came.")
+    box = table.table("hull_box", None)
+    spec = ObjectSpec(
+        source=_source(table, done=False),
+        scale=table.number("scale", 1.0, above=0.0, at_most=1e6),
+        solids=solids,
+        fill_low=box.vector("low", None),
+        fill_high=box.vector("high", None),
+    )
+    box.done()
+    table.done()
+    return spec
+
+
+def _patches(table: Table) -> list[PatchSpec]:
+    """One patch, or one for each of `joints`, whose name stands for {joint}."""
+    joints = table.texts("joints", ())
+    name = table.text("name")
+    if joints and "{joint}" not in name:
+        raise InvalidInput(f"{table.where}.name must hold {{joint}} where 'joints' lists several patches.")
+    return [_patch(table, name.replace("{joint}", joint), joint) for joint in joints] or [_patch(table, name, None)]
+
+
+def _patch(table: Table, name: str, joint: str | None) -> PatchSpec:
+    kind = table.exactly_one("vertices", "positions", "disk")
+    disk = None
+    if kind == "disk":
+        inner = table.table("disk")
+        disk = DiskSpec(
+            at=_point(inner, joint, done=False),
+            radius=inner.number("radius", above=0.0),
+            count=inner.count("points", 80, at_least=3, at_most=20_000),
+        )
+        inner.done()
+    axis = table.table("axis", None)
+    place = table.table("place") if "place" in table else None
+    spec = PatchSpec(
+        name=name,
+        vertices=table.counts("vertices", ()),
+        positions=table.vectors("positions", ()),
+        disk=disk,
+        axis=tuple(_point(point, joint) for point in axis.tables("through")) if "through" in axis else (),
+        generator=axis.text("generator", "along_bone"),
+        generator_options={k: axis.raw(k) for k in axis.values if k not in ("through", "generator")},
+        place=None if place is None else _root(place),
+    )
+    table.raw("place", None)
+    table.done()
+    if len(spec.axis) == 1 or (spec.axis and spec.generator_options):
+        raise InvalidInput(
+            f"{axis.where}.through needs at least two points, and no generator's settings beside it."
+        )
+    return spec
+
+
+def _point(table: Table, joint: str | None, *, done: bool = True) -> PointSpec:
+    if joint is not None and not {"vertex", "position", "joint"} & set(table.values):
+        kind = "joint"
+    else:
+        kind, joint = table.exactly_one("vertex", "position", "joint"), None
+    toward = table.raw("toward", "palm")
+    spec = PointSpec(
+        vertex=table.count("vertex", at_most=10**9) if kind == "vertex" else None,
+        position=table.vector("position") if kind == "position" else None,
+        joint=(joint or table.text("joint")) if kind == "joint" else None,
+        along=table.number("along", 0.5, at_least=-1.0, at_most=2.0),
+        toward="palm" if toward == "palm" else table.vector("toward", direction=True),
+    )
+    if done:
+        table.done()
+    return spec
+
+
+def _root(table: Table) -> RootSpec:
+    kind = table.exactly_one("direction", "aim")
+    spec = RootSpec(
+        root=_point(table.table("root"), None),
+        direction=table.vector("direction", direction=True) if kind == "direction" else None,
+        aim=_point(table.table("aim"), None) if kind == "aim" else None,
+    )
+    table.done()
+    return spec
+
+
+def _coarse(table: Table) -> CoarseSpec:
+    pose = table.table("pose", None)
+    spec = CoarseSpec(
+        object_center=table.vector("object_center", (0.0, 0.0, 0.0)),
+        object_rotation=table.vector("object_rotation", (0.0, 0.0, 0.0)),
+        pose={joint: _angles(pose, joint) for joint in pose.values},
+    )
+    table.done()
+    return spec
+
+
+def _angles(table: Table, joint: str) -> tuple[float, ...]:
+    value = table.raw(joint)
+    rows = value if isinstance(value, list) else [value]
+    if not 1 <= len(rows) <= 3 or any(type(x) not in (int, float) or not abs(x) <= 360 for x in rows):
+        raise InvalidInput(f"{table.where}.{joint} must be one to three angles in degrees, but {value!r} came.")
+    return tuple(float(x) for x in rows)
+
+
+def _solve(table: Table) -> SolveSpec:
+    spec = SolveSpec(
+        solver=table.text("solver", None),
+        start=table.choice("start", ("open", "coarse"), "open"),
+        weights=table.vector("weights", (1.0, 1.0, 10.0)),
+        penetration=table.number("penetration", 5.0, at_least=0.0),
+        limits=table.flag("limits", True),
+        settle=table.count("settle", 0, at_most=10),
+        options=dict(table.table("options", None).values),
+    )
+    table.done()
+    if min(spec.weights) < 0:
+        raise InvalidInput(f"{table.where}.weights are not negative, but {list(spec.weights)} came.")
+    return spec
+
+
+def _accept(table: Table) -> dict[str, float]:
+    limits = {key: table.number(key) for key in ACCEPT if key in table}
+    for key in ACCEPT:
+        table.raw(key, None)
+    table.done()
+    return limits
+
+
+def _view(table: Table) -> ViewSpec:
+    size = table.counts("size", [1280, 720])
+    if len(size) != 2 or not all(64 <= n <= 8192 for n in size):
+        raise InvalidInput(
+            f"{table.where}.size must be [width, height] of 64 to 8192 pixels, but {list(size)} came."
+        )
+    spec = ViewSpec(
+        camera_from=table.vector("camera_from", None, direction=True),
+        up=table.vector("up", (0.0, 1.0, 0.0), direction=True),
+        size=(size[0], size[1]),
+    )
+    table.done()
+    return spec
