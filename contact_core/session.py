@@ -166,15 +166,17 @@ class Session(Verbs, SurfaceVerbs):
     def do(self, command: Command, *, origin: str = "user", merge: bool = False) -> int:
         """Commit a command; answers the new revision. It is in the journal when this returns.
 
-        merge: where the command before agrees, both become one undo step. Raises CommandRejected, or FileRefused
-        when it cannot be recorded; then nothing has changed.
+        merge: where the command before agrees, both become one undo step; not inside a host with undo, whose own
+        steps cannot be joined: use a stroke there. Raises CommandRejected, or FileRefused when it cannot be
+        recorded; then nothing has changed.
         """
         if self._macro is not None and self._macro_document is not None:
             self._macro_document = apply_command(command, self._macro_document)
             self._macro.append(command)
             return self.revision
         self._check_writable()
-        step = self.history.prepare(command, origin, merge=merge)
+        host_keeps_steps = self._host_link is not None and self._host_link.has_undo
+        step = self.history.prepare(command, origin, merge=merge and not host_keeps_steps)
         before = self.history.document
         with self._in_host(step.command.label(), step.after, step.revision):
             if self._file is not None:

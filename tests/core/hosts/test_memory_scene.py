@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from contact_core.document.asset import Asset
 from contact_core.document.schema import parse_document, same_documents
+from contact_core.edit.commands.organising import Recolor
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.placement import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
@@ -208,3 +209,21 @@ def test_refusals_name_what_is_there() -> None:
 def _outward(rig: Rig) -> np.ndarray:
     centre = rig.surface.points.mean(axis=0)
     return np.asarray(rig.surface.points[rig.surface.faces].mean(axis=1) - centre)
+
+
+def test_merging_commands_in_a_host_loses_no_step() -> None:
+    """A host cannot join its own steps, so each command stays one: undo goes back one by one, redo returns."""
+    host = MemoryHost()
+    host.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
+    session = Session(host=host, discover=False)
+    mesh = meshes.family("torus")
+    session.add_surface("torus", mesh)
+    points = SurfacePoints.at_vertices(mesh, np.arange(12))
+    session.paint("grip", points, surface="torus", axis=points[[0, 6]])
+    for color in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+        session.do(Recolor(("grip",), color), merge=True)
+    last = session.document
+    session.undo()
+    assert session.document.patch("grip").color == (1.0, 0.0, 0.0)
+    session.redo()
+    assert session.document is last, "the history kept the step"
