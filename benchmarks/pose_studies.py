@@ -21,9 +21,10 @@ from contact_builtins.solvers.stepwise import ProgressiveSolver, StagedSolver
 from contact_core.arrays import FloatArray
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job import run as job_run
-from contact_core.job.recipe import load_recipe
+from contact_core.job.recipe_reader import load_recipe
+from contact_core.job.run import prepare
 from contact_core.job.solving import pose_problem
+from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.slots import Picture, PictureMesh
 from contact_core.pose.body import PairedPoints
 from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
@@ -32,7 +33,6 @@ from contact_core.pose.problem import Limits, PoseProblem
 from contact_core.pose.rig import skin
 from contact_core.pose.solver import PoseSolution, PoseSolver, SolveOptions, patch_residuals, posed_mesh
 from contact_core.pose.terms import DistanceTerm, PriorTerm, paper_terms
-from contact_core.session import Session
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SKIN, OBJECT = (0.85, 0.7, 0.6), (0.75, 0.78, 0.85)
@@ -100,12 +100,9 @@ def judged(full: PoseProblem, solution: PoseSolution) -> Judged:
 
 def grip(recipe: str) -> PoseProblem:
     """The problem of an example recipe, with the paper's three terms."""
-    session = Session()
-    job = job_run.Job(load_recipe(REPOSITORY / "examples" / recipe), session)
-    job_run._read(job, session.plugins)
-    job_run._paint(job, session.plugins)
-    job_run._place(job, session.plugins)
-    return replace(pose_problem(job, session.plugins, job.start), terms=paper_terms())
+    plugins = PluginManager()
+    job = prepare(load_recipe(REPOSITORY / "examples" / recipe), plugins)
+    return replace(pose_problem(job, plugins, job.start), terms=paper_terms())
 
 
 def ablation(name: str, problem: PoseProblem, solver: PoseSolver) -> tuple[list[str], list[Judged]]:

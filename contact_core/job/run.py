@@ -124,11 +124,17 @@ def run(
 
 def perform(recipe: Recipe, plugins: PluginManager, *, progress: JobProgress | None = None) -> Job:
     """All of a job but its files: read, paint, place, solve, measure. Raises ContactError."""
+    job = prepare(recipe, plugins, progress=progress)
+    _solve(job, plugins)
+    return job
+
+
+def prepare(recipe: Recipe, plugins: PluginManager, *, progress: JobProgress | None = None) -> Job:
+    """A job up to its solve: read, painted, placed and paired; `solving.pose_problem` makes its problem."""
     job = Job(recipe, Session(discover=False), progress)
     _read(job, plugins)
     _paint(job, plugins)
     _place(job, plugins)
-    _solve(job, plugins)
     return job
 
 
