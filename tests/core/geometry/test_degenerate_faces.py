@@ -1,4 +1,4 @@
-"""Faces without area (collapsed edges, three corners on a line): a sentence or a right answer, never NaN or a lie."""
+"""Faces without area (collapsed edges, three corners on a line): a sentence or a right answer, never a lie."""
 
 from __future__ import annotations
 
