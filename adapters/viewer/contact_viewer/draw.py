@@ -92,14 +92,14 @@ def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels
 
 def _light(plotter: Any, pyvista: Any, axes: Any, centre: Any, distance: float) -> None:
     """A key light from the upper left and a weaker one from the eye."""
-    for direction, strength in ((np.array([-0.45, 0.65, 0.75]), 0.42), (np.array([0.15, 0.0, 1.0]), 0.30)):
+    for direction, strength in ((np.array([-0.45, 0.65, 0.75]), 0.78), (np.array([0.15, 0.0, 1.0]), 0.52)):
         light = pyvista.Light(
             position=centre + distance * (direction @ axes),
             focal_point=centre,
             intensity=strength,
             light_type="scene light",
         )
-        plotter.add_light(light)
+        plotter.add_light(light, only_active=True)  # or every picture beside it is lit again
 
 
 def _write(plotter: Any, picture: Picture, pixels: int) -> None:
