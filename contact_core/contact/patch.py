@@ -25,15 +25,18 @@ from contact_core.geometry.tracing import trace_chains
 @dataclass(frozen=True, eq=False)
 class PatchPoints:
     """A reconstructed patch. points: n. remaining: (n,) length that a boundary kept from being walked, on the axis
-    or from it; such points lie on the boundary, and are reported rather than dropped."""
+    or from it; such points lie on the boundary, and are reported rather than dropped. headings: (n,) unit complex,
+    the direction in which each path from the axis ends (1 where it has no length)."""
 
     points: SurfacePoints
     remaining: FloatArray
     axis: Axis
+    headings: ComplexArray
 
     def __post_init__(self) -> None:
         n = len(self.points)
         object.__setattr__(self, "remaining", frozen(self.remaining, np.float64, (n,), "remaining"))
+        object.__setattr__(self, "headings", frozen(self.headings, np.complex128, (n,), "headings of a patch"))
 
     @property
     def ran_off(self) -> BoolArray:
@@ -95,7 +98,7 @@ def points_from_axis(
     unit: float = 1.0,
 ) -> PatchPoints:
     """The points that hang on a reconstructed axis: one trace each, all in one batch."""
-    legs, lengths = _scaled(coordinates, axis_shape.along * unit, axis_shape.spread * unit)
+    legs, lengths = scaled_legs(coordinates, axis_shape.along * unit, axis_shape.spread * unit)
     angles = coordinates.chain_angles
     if mirrored:
         legs, angles = np.conj(legs), -angles
@@ -103,7 +106,7 @@ def points_from_axis(
     trace = trace_chains(
         mesh, axis.points[anchors], legs * axis.tangents[anchors], coordinates.chain_starts, angles, lengths
     )
-    return PatchPoints(trace.points, trace.remaining + axis.remaining[anchors], axis)
+    return PatchPoints(trace.points, trace.remaining + axis.remaining[anchors], axis, trace.headings)
 
 
 def transfer_patch(
@@ -115,7 +118,7 @@ def transfer_patch(
     return points_from_axis(target, coordinates, placed, axis_shape, mirrored=True)
 
 
-def _scaled(coordinates: PatchCoordinates, along: float, spread: float) -> tuple[ComplexArray, FloatArray]:
+def scaled_legs(coordinates: PatchCoordinates, along: float, spread: float) -> tuple[ComplexArray, FloatArray]:
     """First legs stretched along and across the axis, and the legs after them by as much as the first grew."""
     legs, lengths = coordinates.legs, coordinates.chain_lengths
     if along == spread:
@@ -133,7 +136,7 @@ def _unshaped(
 ) -> PatchCoordinates:
     """Coordinates measured on a scaled or mirrored axis, as they are on the axis before that."""
     along, spread = (shape.along * unit, shape.spread * unit) if shape is not None else (unit, unit)
-    legs, lengths = _scaled(coordinates, 1.0 / along, 1.0 / spread)
+    legs, lengths = scaled_legs(coordinates, 1.0 / along, 1.0 / spread)
     angles = coordinates.chain_angles
     if mirrored:
         legs, angles = np.conj(legs), -angles

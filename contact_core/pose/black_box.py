@@ -1,8 +1,8 @@
 """Black-box bodies (tier B): something else evaluates them, a solver sees points, normals and numbers.
 
 For rigs that the analytic skin cannot honour (dual quaternions, envelopes, constraints, a host's own deformers) and
-for anything else that moves contact points by parameters. Derivatives are central differences, so every
-iteration costs twice as many evaluations as there are free dofs.
+for anything else that moves contact points by parameters. Derivatives are central differences, so every iteration
+costs twice as many evaluations as there are free dofs; what knows its own is a `Differentiable`.
 
 A pose of a black box is its dofs by name, each as a translation along x.
 """
@@ -23,6 +23,17 @@ from contact_core.pose.rig import Pose, Rig
 
 # theta (all dofs) -> world points (k, 3) and unit normals (k, 3) of the watched contact points
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+@runtime_checkable
+class Differentiable(Protocol):
+    """An `Evaluate` that knows its derivatives."""
+
+    def __call__(self, theta: FloatArray, /) -> tuple[FloatArray, FloatArray]: ...
+
+    def derivatives(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(d, k, 3) of points and of normals, by all dofs."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -94,7 +105,10 @@ class BlackBoxMotion:
         self.generators: FloatArray = np.zeros((len(theta), 3, 4))
 
     def derivatives(self, dofs: IntArray) -> tuple[FloatArray, FloatArray]:
-        """(q, k, 3) of points and of normals, by some of the dofs: central differences."""
+        """(q, k, 3) of points and of normals, by some of the dofs: its own, or central differences."""
+        if isinstance(self._chart.evaluate, Differentiable):
+            own = self._chart.evaluate.derivatives(self._theta)
+            return own[0][dofs], own[1][dofs]
         moved, turned = (np.empty((len(dofs), len(self.points), 3)) for _ in range(2))
         for row, q in enumerate(dofs):
             size = self._chart.black_box.dofs[q].step

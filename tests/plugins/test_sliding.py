@@ -16,6 +16,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.pose.black_box import Differentiable
 from contact_core.pose.body import Body, PairedPoints
 from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
 from contact_core.pose.problem import PoseProblem
@@ -102,3 +103,29 @@ def test_refusals() -> None:
         with pytest.raises(InvalidInput) as refusal:
             sliding_problem(problem, [wrong])
         assert len(str(refusal.value).split()) > 6
+
+
+@pytest.mark.parametrize("mirrored", [True, False])
+def test_derivatives_on_a_curved_surface(mirrored: bool) -> None:
+    """Where no path meets a vertex the derivative of tracing is exact, against central differences."""
+    ball = meshes.icosphere(3)
+    centre, tip = Locator.of(ball).closest(np.array([[0.3, 0.5, 0.8], [0.5, 0.4, 0.75]])).points, 1
+    axis_shape, axis = draw_axis(ball, centre)
+    random = np.random.default_rng(4)
+    near = axis.points[tip].positions(ball) + random.normal(0.0, 0.15, (12, 3))
+    points = Locator.of(ball).closest(near).points
+    shape = PatchShape(axis_shape, parameterize_patch(ball, axis, points), np.ones(12))
+    bent = replace(axis_shape, along=1.2, spread=0.9)
+    world = np.diag([2.0, 2.0, 2.0, 1.0])
+    patch = SlidingPatch("c", shape, axis.root(), 0.2, mirrored=mirrored, unit=1.1, axis=bent)
+    meant = reconstruct_patch(ball, shape, axis.root(), axis_shape=bent, mirrored=mirrored, unit=1.1).points
+    evaluate = SlidingTarget(ball, patch, world, meant).watch(meant)
+    assert isinstance(evaluate, Differentiable)
+    theta, step = np.array([0.31, -0.22, 0.17]), 1e-7
+    for found in range(2):
+        exact = evaluate.derivatives(theta)[found]  # (3, k, 3)
+        for q, unit in enumerate(step * np.eye(3)):
+            numeric = (evaluate(theta + unit)[found] - evaluate(theta - unit)[found]) / (2.0 * step)
+            away = np.abs(exact[q] - numeric).max(axis=1)
+            assert np.abs(numeric).max() > 0.01
+            assert np.median(away) < 1e-6 and (away < 1e-6).mean() > 0.8, away

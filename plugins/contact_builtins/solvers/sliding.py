@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
-from contact_core.contact.patch import reconstruct_patch
+from contact_core.arrays import ComplexArray, FloatArray
+from contact_core.contact.patch import PatchPoints, reconstruct_patch, scaled_legs
 from contact_core.contact.placement import Root
-from contact_core.contact.shape import PatchShape
+from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tangent import heading_to_direction
 from contact_core.geometry.tracing import trace_geodesic
 from contact_core.pose.black_box import BlackBoxDof, Evaluate
 from contact_core.pose.body import Body
@@ -35,7 +36,8 @@ class SlidingPatch:
     """A target patch that may slide. contact: name of the pair in the problem; its points are `shape` at `root`.
 
     slack: how far the root may go, surface units. turn: how far the heading may turn, radians. penalty: prior
-    weight of a slide by the whole slack or a turn by the whole turn.
+    weight of a slide by the whole slack or a turn by the whole turn. mirrored, unit, axis: as in
+    `reconstruct_patch`.
     """
 
     contact: str
@@ -46,6 +48,7 @@ class SlidingPatch:
     penalty: float = 1.0
     mirrored: bool = True
     unit: float = 1.0
+    axis: AxisShape | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +72,9 @@ class SlidingTarget:
             raise InvalidInput(f"the slack of {patch.contact!r} is a positive length, but {patch.slack} came.")
         self.surface, self.patch, self.world = surface, patch, np.asarray(world_from_surface, float)
         names = (*DIRECTIONS, "turn") if patch.turn > 0.0 else DIRECTIONS
+        self._last: dict[bytes, PatchPoints] = {}
         self.dofs = [BlackBoxDof(name, -1.0, 1.0, patch.penalty, step=1e-4) for name in names]
-        found = self._points(np.zeros(len(names)))
+        found = self.placed(np.zeros(len(names))).points
         away = np.linalg.norm(found.positions(surface) - meant.positions(surface), axis=1)
         if len(found) != len(meant) or away.max(initial=0.0) > 1e-6 * surface.bounding_box_diagonal:
             raise InvalidInput(f"the object points of {patch.contact!r} are not its patch at the given root.")
@@ -86,22 +90,91 @@ class SlidingTarget:
         carried = trace.headings[0] * start.heading * abs(vector) / vector  # parallel transport keeps the angle
         return Root.at(trace.points, complex(carried * turned))
 
-    def _points(self, theta: FloatArray) -> SurfacePoints:
-        patch = self.patch
-        return reconstruct_patch(
-            self.surface, patch.shape, self.root(theta), mirrored=patch.mirrored, unit=patch.unit
-        ).points
+    def placed(self, theta: FloatArray) -> PatchPoints:
+        """The patch at theta, traced; the last one is kept, for derivatives come after values."""
+        key = theta.tobytes()
+        if key not in self._last:
+            patch, root = self.patch, self.root(theta)
+            traced = reconstruct_patch(
+                self.surface, patch.shape, root, axis_shape=patch.axis, mirrored=patch.mirrored, unit=patch.unit
+            )
+            self._last = {key: traced}
+        return self._last[key]
 
     def watch(self, points: SurfacePoints) -> Evaluate:
         """The patch's own points, all of them; `points` are they at theta 0."""
+        return _Slide(self)
 
-        def evaluate(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-            placed = self._points(theta)
-            normals = placed.normals(self.surface) @ self.world[:3, :3].T
-            length = np.linalg.norm(normals, axis=1, keepdims=True)
-            return placed.positions(self.surface) @ self.world[:3, :3].T + self.world[:3, 3], normals / length
 
-        return evaluate
+class _Slide:
+    """Points and normals of a sliding patch in the world, with exact derivatives.
+
+    A path of straight legs crosses a strip of faces that unfolds into the plane. So when the root moves by a small
+    vector, each point moves by the same vector, carried along its path; and when the root turns, each point turns
+    about it in the plane. Paths that meet a vertex have no derivative, and there this is that of one side.
+    """
+
+    def __init__(self, target: SlidingTarget) -> None:
+        self.target, self.surface = target, target.surface
+        self.linear: FloatArray = target.world[:3, :3]
+        self.unfolded, self.ends = _unfold(target.patch)
+
+    def __call__(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        placed = self.target.placed(theta).points
+        normals = placed.normals(self.surface) @ self.linear.T
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return placed.positions(self.surface) @ self.linear.T + self.target.world[:3, 3], normals / length
+
+    def derivatives(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(d, k, 3) of points and of normals."""
+        patch, placed = self.target.patch, self.target.placed(theta)
+        anchors = patch.shape.coordinates.anchors
+        stays = patch.shape.coordinates.legs == 0.0
+        arrived = np.where(stays, placed.axis.tangents[anchors], placed.headings)
+        carried = arrived / self.ends  # (k,) from the plane into the frame of each point
+        turned = np.exp(1j * patch.turn * theta[2]) if len(theta) > 2 else 1.0
+        along = np.full(len(carried), patch.slack / turned)
+        plane = np.stack([along, 1j * along, 1j * patch.turn * self.unfolded][: len(theta)])  # (d, k)
+        ahead, aside = (heading_to_direction(self.surface, placed.points, turn * carried) for turn in (1.0, 1j))
+        moved = plane.real[..., None] * ahead + plane.imag[..., None] * aside  # (d, k, 3)
+        return moved @ self.linear.T, self._normals_moved(placed.points, moved)
+
+    def _normals_moved(self, points: SurfacePoints, moved: FloatArray) -> FloatArray:
+        """(d, k, 3) derivative of the world normals where the points move by `moved` within their faces."""
+        mesh = self.surface
+        corners = mesh.faces[points.faces]  # (k, 3)
+        position = mesh.points[corners]  # (k, 3, 3)
+        opposite = np.roll(position, -2, axis=1) - np.roll(position, -1, axis=1)
+        normal = np.cross(opposite[:, 0], opposite[:, 1])  # (k, 3) twice the area long
+        slope = np.cross(normal[:, None], opposite) / np.einsum("ki,ki->k", normal, normal)[:, None, None]
+        vertex = mesh.vertex_normals[corners] @ self.linear.T  # (k, 3, 3)
+        blended = np.einsum("kc,kci->ki", points.barycentric, vertex)
+        change = np.einsum("kcj,qkj,kci->qki", slope, moved, vertex)
+        length = np.linalg.norm(blended, axis=1, keepdims=True)
+        unit = blended / length
+        change = change - np.einsum("qki,ki->qk", change, unit)[..., None] * unit
+        return np.asarray(change / length)
+
+
+def _unfold(patch: SlidingPatch) -> tuple[ComplexArray, ComplexArray]:
+    """A patch laid out in the plane along its paths, the root at 0 heading along 1: points (k,) and the unit
+    directions (k,) in which their paths end."""
+    shape, coordinates = patch.axis or patch.shape.axis, patch.shape.coordinates
+    sign = -1.0 if patch.mirrored else 1.0
+    turns = np.concatenate([[0.0], sign * shape.turning_angles, [0.0]])[: shape.point_count]
+    headings = np.exp(1j * np.cumsum(turns))  # (m,) as `Axis.tangents`
+    steps = shape.lengths * (shape.along * patch.unit) * headings[:-1]
+    knots = np.concatenate([[0.0], np.cumsum(steps)])  # (m,)
+    legs, lengths = scaled_legs(coordinates, shape.along * patch.unit, shape.spread * patch.unit)
+    first = (legs.conj() if patch.mirrored else legs) * headings[coordinates.anchors]
+    size = np.abs(first)
+    ends = np.where(size > 0.0, first / np.where(size > 0.0, size, 1.0), headings[coordinates.anchors])
+    points = knots[coordinates.anchors] + first
+    for i in np.flatnonzero(np.diff(coordinates.chain_starts)):
+        for row in range(coordinates.chain_starts[i], coordinates.chain_starts[i + 1]):
+            ends[i] *= np.exp(1j * sign * coordinates.chain_angles[row])
+            points[i] += lengths[row] * ends[i]
+    return points, ends
 
 
 def sliding_problem(problem: PoseProblem, patches: Sequence[SlidingPatch]) -> PoseProblem:
@@ -137,8 +210,8 @@ def solve_sliding(
 ) -> SlidSolution:
     """Solve the pose with fixed targets first, then pose and slides together from there.
 
-    Every iteration traces each patch seven times, so sliding is for when the pose is nearly there: some 40
-    iterations by default.
+    Every iteration traces each patch once, so sliding is for when the pose is nearly there: some 40 iterations by
+    default.
     """
     fixed = solver.solve(problem, options, progress)
     targets = {patch.contact: patch for patch in patches}
