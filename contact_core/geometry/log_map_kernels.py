@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.jit import constant, inlined, kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -105,7 +105,7 @@ def list_targets(
     return -1
 
 
-@kernel
+@inlined
 def offer(
     t: int, rank: float, distance: float, root: int, wedge: int, zx: float, zy: float, h: int, dx: float, dy: float,
     target_floats: FloatArray, target_integers: IntArray,
@@ -119,7 +119,7 @@ def offer(
     target_integers[t, ARRIVAL] = h
 
 
-@kernel
+@inlined
 def light_targets(
     w: int, epoch: float, shape: FloatArray, listed: FloatArray, floats: FloatArray, integers: IntArray,
     target_floats: FloatArray, target_integers: IntArray,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.jit import constant, inlined, kernel
 from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, following, has_three_corners, preceding
 
 ON_FACE = constant(0)  # element: face; x, y in the frame of halfedge 3f
@@ -24,7 +24,7 @@ SNAP = 1e-11
 PI = math.pi
 
 
-@kernel
+@inlined
 def place(
     f: int, b0: float, b1: float, b2: float, tail: IntArray, twin: IntArray, shape: FloatArray
 ) -> tuple[int, int, float, float]:
@@ -49,7 +49,7 @@ def place(
     return ON_FACE, f, b1 * l0 + b2 * shape[h, 1], b2 * shape[h, 2]
 
 
-@kernel
+@inlined
 def on_edge(h: int, x: float, twin: IntArray, shape: FloatArray) -> tuple[int, int, float, float]:
     """The place at x along halfedge h."""
     if 0 <= twin[h] < h:
@@ -57,7 +57,7 @@ def on_edge(h: int, x: float, twin: IntArray, shape: FloatArray) -> tuple[int, i
     return ON_EDGE, h, x, 0.0
 
 
-@kernel
+@inlined
 def direction_of_next(h: int, shape: FloatArray) -> tuple[float, float]:
     """The unit direction of the next halfedge in the frame of h.
 
@@ -68,7 +68,7 @@ def direction_of_next(h: int, shape: FloatArray) -> tuple[float, float]:
     return -shape[h_next, 1] / shape[h, 0], shape[h_next, 2] / shape[h, 0]
 
 
-@kernel
+@inlined
 def direction_in_face(h: int, shape: FloatArray) -> tuple[float, float]:
     """The unit direction of halfedge h in the frame of its face."""
     k = h % 3
@@ -79,25 +79,25 @@ def direction_in_face(h: int, shape: FloatArray) -> tuple[float, float]:
     return -shape[h - 2, 1] / shape[h, 0], -shape[h - 2, 2] / shape[h, 0]
 
 
-@kernel
+@inlined
 def norm(x: float, y: float) -> float:
     """Length of (x, y); math.hypot guards against overflow at several times the cost."""
     return math.sqrt(x * x + y * y)
 
 
-@kernel
+@inlined
 def turned(x: float, y: float, cos: float, sin: float) -> tuple[float, float]:
     """(x + iy)(cos + i sin)."""
     return x * cos - y * sin, x * sin + y * cos
 
 
-@kernel
+@inlined
 def turned_back(x: float, y: float, cos: float, sin: float) -> tuple[float, float]:
     """(x + iy)(cos - i sin)."""
     return x * cos + y * sin, y * cos - x * sin
 
 
-@kernel
+@inlined
 def corner_angle(h: int, shape: FloatArray) -> float:
     """The angle of the face at the tail of halfedge h (radians)."""
     return math.atan2(shape[h, 2], shape[h, 1])
@@ -114,13 +114,13 @@ def angle_round_vertex(h: int, x: float, y: float, shape: FloatArray) -> float:
     return shape[h, 3] + half + math.atan2(v, u)
 
 
-@kernel
+@inlined
 def vertex_scale(v: int, angle_sum: FloatArray, kind: IntArray) -> float:
     """Factor from angles round a vertex to angles of its tangent frame."""
     return (PI if kind[v] == BOUNDARY_VERTEX else 2.0 * PI) / angle_sum[v]
 
 
-@kernel
+@inlined
 def corner_of(f: int, v: int, tail: IntArray) -> int:
     """The halfedge of face f that leaves vertex v."""
     if tail[3 * f] == v:
@@ -139,7 +139,7 @@ def corner_at_angle(v: int, angle: float, twin: IntArray, shape: FloatArray, fir
         h = onward
 
 
-@kernel
+@inlined
 def heading_at(
     on: int,
     element: int,

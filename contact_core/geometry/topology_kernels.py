@@ -6,7 +6,7 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry import topology
-from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.jit import constant, inlined, kernel
 
 BOUNDARY = constant(topology.BOUNDARY)
 BLOCKED = constant(topology.BLOCKED)
@@ -15,13 +15,13 @@ BOUNDARY_VERTEX = constant(topology.BOUNDARY_VERTEX)
 BLOCKED_VERTEX = constant(topology.BLOCKED_VERTEX)
 
 
-@kernel
+@inlined
 def following(h: int) -> int:
     """The next halfedge of the same face."""
     return h + 1 if h % 3 != 2 else h - 2
 
 
-@kernel
+@inlined
 def preceding(h: int) -> int:
     """The previous halfedge of the same face."""
     return h - 1 if h % 3 != 0 else h + 2

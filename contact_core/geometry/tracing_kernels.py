@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.jit import constant, inlined, kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -45,7 +45,7 @@ MOST_CROSSINGS = constant(5_000_000)
 GRAZE = 1e-12  # radians by which a direction may point out of a boundary and still run along it
 
 
-@kernel
+@inlined
 def start_on_edge(
     h: int, x: float, dx: float, dy: float, twin: IntArray, shape: FloatArray
 ) -> tuple[int, float, float, float]:
@@ -58,7 +58,7 @@ def start_on_edge(
     return other, shape[h, 0] - x, -dx, -dy
 
 
-@kernel
+@inlined
 def start_in_face(
     f: int, x: float, y: float, dx: float, dy: float, shape: FloatArray
 ) -> tuple[int, float, float, float, float]:
@@ -75,7 +75,7 @@ def start_in_face(
     return h + 1, x, y, dx, dy
 
 
-@kernel
+@inlined
 def onward_angle(v: int, back: float, angle_sum: FloatArray, kind: IntArray) -> float:
     """The angle at which a straight walk leaves vertex v that it reached from angle `back`; negative: nowhere.
 
@@ -90,7 +90,7 @@ def onward_angle(v: int, back: float, angle_sum: FloatArray, kind: IntArray) -> 
     return angle - total if angle >= total else angle
 
 
-@kernel
+@inlined
 def record(
     h: int, fraction_head: float, fraction_apex: float, faces: IntArray, barycentric: FloatArray, i: int
 ) -> None:
@@ -102,7 +102,7 @@ def record(
     barycentric[i, (k + 2) % 3] = fraction_apex
 
 
-@kernel
+@inlined
 def append(f: int, b0: float, b1: float, b2: float, faces: IntArray, barycentric: FloatArray, end: int) -> int:
     """Append a surface point to buffers that may be full; returns the new end, beyond the buffers if they were."""
     if end < len(faces):
@@ -110,7 +110,7 @@ def append(f: int, b0: float, b1: float, b2: float, faces: IntArray, barycentric
     return end + 1
 
 
-@kernel
+@inlined
 def walk(
     on: int,
     element: int,
@@ -225,7 +225,7 @@ def walk(
     return TOO_LONG, h, x, y, dx, dy, remaining, line_end
 
 
-@kernel
+@inlined
 def settle(
     h: int,
     x: float,

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.jit import constant, inlined, kernel
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -63,7 +63,7 @@ MOST_SLACK = 1e-6
 SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
 
 
-@kernel
+@inlined
 def heap_push(key: float, item: int, keys: FloatArray, items: IntArray, state: IntArray) -> None:
     """Insert into the binary min-heap; sets OVERFLOW when it is full."""
     i = state[HEAP_SIZE]
@@ -80,7 +80,7 @@ def heap_push(key: float, item: int, keys: FloatArray, items: IntArray, state: I
     keys[i], items[i] = key, item
 
 
-@kernel
+@inlined
 def heap_pop(keys: FloatArray, items: IntArray, state: IntArray) -> int:
     """Remove the item of the smallest key."""
     top = items[0]
@@ -102,13 +102,13 @@ def heap_pop(keys: FloatArray, items: IntArray, state: IntArray) -> int:
     return top
 
 
-@kernel
+@inlined
 def distance_at(v: int, epoch: float, reach: FloatArray) -> float:
     """The distance found so far at vertex v."""
     return reach[v, 1] if reach[v, 0] == epoch else math.inf
 
 
-@kernel
+@inlined
 def bends_paths(v: int, angle_sum: FloatArray, kind: IntArray) -> bool:
     """Whether shortest paths can bend round vertex v. A blocked vertex counts: it is refused when met."""
     if kind[v] == BOUNDARY_VERTEX:
@@ -132,7 +132,7 @@ def lower(
         heap_push(distance, -1 - v, keys, items, state)
 
 
-@kernel
+@inlined
 def cast(
     edge: int, b0: float, b1: float, sx: float, sy: float, sigma: float, cos: float, sin: float,
     root: int, wedge: int, side: int, split_distance: float, split_crossing: float, slack: float,
@@ -186,7 +186,7 @@ def cast(
     heap_push(key, w, keys, items, state)
 
 
-@kernel
+@inlined
 def propagate(
     w: int, bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray,
     angle_sum: FloatArray, kind: IntArray, reach: FloatArray, leg: FloatArray, origin: IntArray, claim: FloatArray,
@@ -250,7 +250,7 @@ def propagate(
         )  # fmt: skip
 
 
-@kernel
+@inlined
 def lost_its_claim(
     w: int, epoch: float, twin: IntArray, claim: FloatArray, floats: FloatArray, integers: IntArray
 ) -> bool:
