@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import BoolArray, FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
@@ -146,12 +146,6 @@ def bones_through(bones: FloatArray, mesh: TriangleMesh) -> BoolArray:
     if real.any():
         crossed[real] = Locator.of(mesh).cast(bones[real, 0], along[real], max_distance=1.0).hit
     return crossed
-
-
-def bone_segments(parents: IntArray, world: FloatArray) -> FloatArray:
-    """(b, 2, 3) segments from each joint's parent to the joint."""
-    child = np.flatnonzero(parents >= 0)
-    return np.stack([world[parents[child], :3, 3], world[child, :3, 3]], axis=1)
 
 
 def skin_stretch(rest: TriangleMesh, skin: TriangleMesh, percentile: float) -> float:

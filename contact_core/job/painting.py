@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import IntArray
 from contact_core.contact.axis_generator import AxisRequest
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
@@ -16,10 +16,10 @@ from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_geodesic
-from contact_core.job.metrics import bone_segments
 from contact_core.job.recipe import DiskSpec, PatchSpec, PointSpec, RootSpec
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import AXIS_GENERATORS
+from contact_core.pose.bones import bones_of
 from contact_core.pose.rig import Rig
 
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -61,27 +61,6 @@ def axis_picks(
         return plugins.get(AXIS_GENERATORS, spec.generator).generate(request)
     except InvalidInput as error:
         raise type(error)(f"the axis of patch {spec.name!r}: {error}") from error
-
-
-def bones_of(rig: Rig, points: SurfacePoints) -> tuple[FloatArray, IntArray]:
-    """Bones (b, 2, 3) of a rig at rest, and the bone that owns each of the points (n,), -1 for none.
-
-    A bone runs from a joint to its first child; the skin of a joint belongs to that bone.
-    """
-    child = np.flatnonzero(rig.parents >= 0)
-    bones = bone_segments(rig.parents, rig.rest_world)
-    bone_of_joint = np.full(len(rig.joints), -1)
-    for bone in reversed(range(len(child))):
-        bone_of_joint[rig.parents[child[bone]]] = bone
-    for joint, parent in enumerate(rig.parents):  # a last joint lies at the end of its parent's bone
-        if bone_of_joint[joint] < 0 and parent >= 0:
-            bone_of_joint[joint] = bone_of_joint[parent]
-    corners = rig.faces[points.faces]  # (n, 3)
-    strength = np.zeros((len(points), len(rig.joints)))
-    for corner in range(3):
-        weights = points.barycentric[:, corner, None] * rig.skin_weights[corners[:, corner]]  # (n, K)
-        np.add.at(strength, (np.arange(len(points))[:, None], rig.skin_joints[corners[:, corner]]), weights)
-    return bones, bone_of_joint[strength.argmax(axis=1)]
 
 
 def explicit_root(spec: RootSpec, asset: Asset) -> tuple[SurfacePoints, complex]:

@@ -22,7 +22,7 @@ from contact_core.errors import Cancelled, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.assets import object_mesh, read_source, solids_of
-from contact_core.job.metrics import Contact, PosedScene, bone_segments, measure
+from contact_core.job.metrics import Contact, PosedScene, measure
 from contact_core.job.outputs import write_outputs
 from contact_core.job.painting import axis_picks, explicit_root, paint
 from contact_core.job.recipe import Recipe
@@ -34,6 +34,7 @@ from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import PLACERS
 from contact_core.plugins.slots import PlacementRequest, PlacementResult
 from contact_core.pose.body import manipulator_length
+from contact_core.pose.bones import bone_segments
 from contact_core.pose.rig import Pose, Rig
 from contact_core.pose.solver import PoseSolution
 from contact_core.session import Session

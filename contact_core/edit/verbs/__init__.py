@@ -1,5 +1,6 @@
 """The artist's verbs: each finds out, with the meshes, what a command has to hold, and submits that command."""
 
+from contact_core.edit.verbs.brushing import BrushVerbs
 from contact_core.edit.verbs.editor import Editor
 from contact_core.edit.verbs.gathering import GatheringVerbs
 from contact_core.edit.verbs.organising import OrganisingVerbs
@@ -8,7 +9,7 @@ from contact_core.edit.verbs.sets import SetVerbs
 from contact_core.edit.verbs.surfaces import SurfaceVerbs
 
 
-class Verbs(GatheringVerbs, PlacingVerbs, OrganisingVerbs, SetVerbs):
+class Verbs(BrushVerbs, GatheringVerbs, PlacingVerbs, OrganisingVerbs, SetVerbs):
     """All verbs. A session commits what they submit, a stroke previews it."""
 
 

@@ -1,0 +1,77 @@
+"""The verb of brushes: gestures in, one undo step out, which holds the points and knows nothing of the brush."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact_core.arrays import BoolArray
+from contact_core.contact.brush import Brush, BrushGesture, BrushMark
+from contact_core.document.document import Color
+from contact_core.edit.verbs.painting import PaintingVerbs
+from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.geometry.exact_geodesics import log_map
+from contact_core.geometry.surface_point import SurfacePoints
+
+
+class BrushVerbs(PaintingVerbs):
+    """Paint and erase with brushes."""
+
+    def named_brush(self, name: str) -> Brush:
+        """A brush by name; a session asks its plugins."""
+        raise InvalidInput(
+            f"only a session knows brushes by name: ask its named_brush({name!r}) before, and pass what it answers."
+        )
+
+    def brush(
+        self,
+        brush: str | Brush,
+        patch: str,
+        *gestures: BrushGesture,
+        surface: str | None = None,
+        axis: SurfacePoints | None = None,
+        generator: str | None = None,
+        color: Color | None = None,
+    ) -> int:
+        """Paint a patch with a brush, or erase from it where the brush erases; all gestures are one step.
+
+        brush: a name, or the brush itself; within a stroke, where no plugin is looked for, only that. surface,
+        axis, generator, color: of a new patch, as for `paint`. Erased is what lies nearer to a point of a mark,
+        over the surface, than the mark's points lie apart.
+        """
+        tool = self.named_brush(brush) if isinstance(brush, str) else brush
+        where = self.document.patches[patch].surface if patch in self.document.patches else surface
+        if where is None:
+            raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")
+        if not gestures:
+            raise InvalidInput(f"the brush {tool.name!r} needs a gesture or several, but none came.")
+        mesh = self.mesh(where)
+        if any(gesture.mesh.digest != mesh.digest for gesture in gestures):
+            raise InvalidInput(f"a gesture for {patch!r} was made over another mesh than that of {where!r}.")
+        marks = [tool.mark(gesture) for gesture in gestures]
+        if tool.erases:
+            here = self.points(patch)
+            under = [_covered(here, mark, gesture) for mark, gesture in zip(marks, gestures, strict=True)]
+            indices = np.flatnonzero(np.any(under, axis=0))
+            if not len(indices):
+                raise CommandRejected(f"no point of {patch!r} lies under the brush {tool.name!r}.")
+            return self.erase(patch, indices)
+        points = SurfacePoints.concatenate([mark.points for mark in marks])
+        strength = np.concatenate([mark.strength for mark in marks])  # (n,)
+        return self.paint(
+            patch, points, surface=where, axis=axis, generator=generator, strength=strength, color=color
+        )
+
+
+def _covered(points: SurfacePoints, mark: BrushMark, gesture: BrushGesture) -> BoolArray:
+    """(n,) which points lie under a mark: its points stand for the area between them, so its widest gap, but no
+    more than the brush's radius, is how far each of them reaches."""
+    from scipy.spatial import cKDTree
+
+    if not len(mark.points):
+        return np.zeros(len(points), bool)
+    reach = gesture.radius or gesture.spacing
+    if len(mark.points) > 1:
+        at = mark.points.positions(gesture.mesh)
+        gap = float(cKDTree(at).query(at, k=2)[0][:, 1].max())
+        reach = min(gap, gesture.radius or gap)
+    return np.asarray(log_map(gesture.mesh, mark.points, points, max_distance=reach).distance <= reach)
