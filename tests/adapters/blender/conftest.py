@@ -72,7 +72,7 @@ else:
     _reports: dict[Path, dict[str, list[pytest.TestReport]]] = {}
 
     @pytest.hookimpl(tryfirst=True)
-    def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
+    def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
         if HERE not in item.path.parents:
             return None
         if item.path not in _reports:
@@ -81,6 +81,8 @@ else:
         for report in _reports[item.path].get(item.nodeid) or [_missing(item)]:
             item.ihook.pytest_runtest_logreport(report=report)
         item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        # The test before left standing what it shares with this one; what the next does not share goes now.
+        item.session._setupstate.teardown_exact(nextitem)
         return True
 
     def _run_module(item: pytest.Item) -> dict[str, list[pytest.TestReport]]:

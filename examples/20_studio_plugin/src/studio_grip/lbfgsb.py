@@ -16,6 +16,7 @@ class LBFGSB:
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
     ) -> PoseSolution:
         options = options or SolveOptions(max_iterations=2000)
+        options.check_settings(self.name)
         run = Run(self.name, problem, progress)
         stopped = unsolvable(run)
         if stopped is not None:
