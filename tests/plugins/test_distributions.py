@@ -24,35 +24,38 @@ def run(*command: str | Path, cwd: Path) -> str:
     return done.stdout
 
 
-@pytest.fixture
-def clean_python(tmp_path: Path) -> Path:
-    """The interpreter of a new environment that sees ours too, so that numpy need not be installed again."""
-    home = tmp_path / "environment"
+def built(source: Path, into: Path) -> Path:
+    """The wheel of a source tree."""
+    into.mkdir(exist_ok=True)
+    run(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", into, source, cwd=into)
+    (wheel,) = into.glob("*.whl")
+    return wheel
+
+
+@pytest.fixture(scope="session")
+def our_wheel(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of contact-core as it is now."""
+    return built(repository, tmp_path_factory.mktemp("wheel"))
+
+
+def installed(*wheels: Path, into: Path) -> Path:
+    """The interpreter of a new environment with these wheels and, behind them, the libraries of this environment.
+
+    A plain path in a .pth file brings numpy and the others without a download, but follows no .pth file there: an
+    editable contact-core stays unseen, and what is imported is the wheel.
+    """
+    home = into / "environment"
     venv.create(home)
     scripts = home / ("Scripts" if os.name == "nt" else "bin")
     python = scripts / ("python.exe" if os.name == "nt" else "python")
+    install = (sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", "--quiet")
+    run(*install, *wheels, cwd=into)
     where = "import sysconfig; print(sysconfig.get_path('purelib'))"
-    site = Path(run(python, "-c", where, cwd=tmp_path).strip())
-    ours = sysconfig.get_path("purelib")
-    site.joinpath("beside.pth").write_text(f"import site; site.addsitedir({ours!r})\n", encoding="utf-8")
+    site = Path(run(python, "-c", where, cwd=into).strip())
+    site.joinpath("libraries.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    ours = Path(run(python, "-c", "import contact_core; print(contact_core.__file__)", cwd=into).strip())
+    assert ours.is_relative_to(site), f"contact_core comes from {ours}"
     return python
-
-
-def install(source: Path, python: Path, scratch: Path) -> None:
-    """Build the wheel of a source tree and install it."""
-    run(
-        sys.executable,
-        "-m",
-        "build",
-        "--wheel",
-        "--no-isolation",
-        "--outdir",
-        scratch / "dist",
-        source,
-        cwd=scratch,
-    )
-    (wheel,) = (scratch / "dist").glob("*.whl")
-    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--quiet", wheel, cwd=scratch)
 
 
 def offers(python: Path, name: str, scratch: Path) -> dict[str, object]:
@@ -60,13 +63,15 @@ def offers(python: Path, name: str, scratch: Path) -> dict[str, object]:
     records = json.loads(run(python, "-m", "contact_core.cli", "plugins", "--json", cwd=scratch))
     (record,) = (record for record in records if record["name"] == name)
     assert record["problems"] == [] and record["origin"] == "entry point"
+    (ours,) = (record for record in records if record["name"] == "builtins")
+    assert ours["problems"] == []
     return dict(record)
 
 
-def test_the_example_distribution_works(repository: Path, clean_python: Path, tmp_path: Path) -> None:
+def test_the_example_distribution_works(repository: Path, our_wheel: Path, tmp_path: Path) -> None:
     source = tmp_path / "source"
     shutil.copytree(repository / "examples" / "20_studio_plugin", source)
-    install(source, clean_python, tmp_path)
+    clean_python = installed(our_wheel, built(source, tmp_path / "dist"), into=tmp_path)
     shutil.rmtree(source / "src")  # what is tested now is the wheel
     record = offers(clean_python, "studio_grip", tmp_path)
     assert record["source"] == "studio-grip 1.0.0"
@@ -74,10 +79,10 @@ def test_the_example_distribution_works(repository: Path, clean_python: Path, tm
     assert " passed" in run(clean_python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests", cwd=source)
 
 
-def test_the_template_passes_at_once(clean_python: Path, tmp_path: Path) -> None:
+def test_the_template_passes_at_once(our_wheel: Path, tmp_path: Path) -> None:
     assert main(["new-plugin", "Studio-Contact", "--in", str(tmp_path), "--quiet"]) == 0
     source = tmp_path / "Studio-Contact"
-    install(source, clean_python, tmp_path)
+    clean_python = installed(our_wheel, built(source, tmp_path / "dist"), into=tmp_path)
     shutil.rmtree(source / "src")
     assert offers(clean_python, "studio_contact", tmp_path)["offers"] == {"axis generator": ["studio_contact"]}
     told = run(clean_python, "-m", "pytest", "-p", "no:cacheprovider", "--contact-report", "tests", cwd=source)
