@@ -65,14 +65,14 @@ SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
 
 @inlined
 def heap_push(key: float, item: int, keys: FloatArray, items: IntArray, state: IntArray) -> None:
-    """Insert into the binary min-heap; sets OVERFLOW when it is full."""
+    """Insert into the min-heap, four children a node; sets OVERFLOW when it is full."""
     i = state[HEAP_SIZE]
     if i >= len(keys):
         state[OVERFLOW] = 1
         return
     state[HEAP_SIZE] = i + 1
     while i > 0:
-        parent = (i - 1) >> 1
+        parent = (i - 1) >> 2
         if keys[parent] <= key:
             break
         keys[i], items[i] = keys[parent], items[parent]
@@ -89,14 +89,16 @@ def heap_pop(keys: FloatArray, items: IntArray, state: IntArray) -> int:
     key, item = keys[size], items[size]
     i = 0
     while True:
-        child = 2 * i + 1
+        child = 4 * i + 1
         if child >= size:
             break
-        if child + 1 < size and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[child] >= key:
+        least, last = keys[child], min(child + 4, size)
+        for other in range(child + 1, last):
+            if keys[other] < least:
+                child, least = other, keys[other]
+        if least >= key:
             break
-        keys[i], items[i] = keys[child], items[child]
+        keys[i], items[i] = least, items[child]
         i = child
     keys[i], items[i] = key, item
     return top
@@ -205,7 +207,9 @@ def propagate(
     beyond_right = -((b1 - sx) * ry + sy * rx)
     span, blur = abs(rx) + ry, BLUR * (length + left_length + right_length)
     left_ray, right_ray = abs(b0 - sx) - sy, abs(b1 - sx) - sy
-    slack = min(max(record[SLACK], blur / min(left_ray, right_ray)), MOST_SLACK)
+    slack, nearest_ray = record[SLACK], min(left_ray, right_ray)
+    if blur > slack * nearest_ray:
+        slack = min(blur / nearest_ray, MOST_SLACK)
     left, right = beyond_left <= 0.0, beyond_right <= 0.0
     split_distance, split_crossing = -1.0, 0.0
     if beyond_left <= span * slack * left_ray and beyond_right <= span * slack * right_ray:
