@@ -17,20 +17,23 @@ from contact_core.edit.history import History, Step
 from contact_core.edit.open_document import OpenDocument
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
-from contact_core.edit.verbs import SurfaceVerbs, Verbs
 from contact_core.errors import CommandRejected, FileRefused
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.proposals.verbs import ProposalVerbs
 
 if TYPE_CHECKING:
+    from contact_core.contact.brush import Brush
     from contact_core.host_link import HostLink
     from contact_core.plugins.manager import PluginManager
+    from contact_core.proposals.proposal import Proposal
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DocumentChanged:
-    """What listeners are told. kind: "preview" comes during a stroke; its revision is that of the start.
+    """What listeners are told. kind: "preview" comes during a stroke or shows the
+    ghost of a proposal; its revision is that of the start.
 
     command: the one done, undone or redone; None for a jump or a preview.
     """
@@ -46,7 +49,7 @@ class DocumentChanged:
 Listener = Callable[[DocumentChanged], None]
 
 
-class Session(Verbs, SurfaceVerbs):
+class Session(ProposalVerbs):
     """Edits one document.
 
     document: to start from, empty by default. plugins: modules or objects with hook implementations, of highest
@@ -280,6 +283,10 @@ class Session(Verbs, SurfaceVerbs):
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
+    def show_ghost(self, ghost: Proposal | None) -> None:
+        """Tell listeners of a preview of what is proposed; None: back to the document."""
+        self._preview(self.document, self.document if ghost is None else ghost.ghost)
+
     # -- plugins -------------------------------------------------------------------------------------------------
 
     @property
@@ -311,6 +318,12 @@ class Session(Verbs, SurfaceVerbs):
         if generator is None:
             return super().default_axis(surface, patch, points, generator)
         return self.plugins.get(AXIS_GENERATORS, generator).generate(self.axis_request(surface, patch, points))
+
+    def named_brush(self, name: str) -> Brush:
+        """A brush of this session's plugins. Raises InvalidInput that lists what there is."""
+        from contact_core.plugins.registry import BRUSHES
+
+        return self.plugins.get(BRUSHES, name)
 
     # -- inside --------------------------------------------------------------------------------------------------
 

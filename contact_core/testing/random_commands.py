@@ -170,6 +170,13 @@ def rebind_surface(document: ContactDocument, rng: Rng) -> Command | None:
     return kinds.RebindSurface(new, FrozenMap(shapes), places)
 
 
+def settle(document: ContactDocument, rng: Rng) -> Command | None:
+    patches = [patch for patch in document.patches.values() if rng.random() < 0.5]
+    posed = [command for command in (set_pose(document, rng),) if isinstance(command, kinds.SetPose)]
+    placements = tuple((patch.name, _moved(document, rng, patch)) for patch in patches)
+    return kinds.Settle(placements, FrozenMap({command.surface: command.pose for command in posed}))
+
+
 def set_pose(document: ContactDocument, rng: Rng) -> Command | None:
     surface = _pick(rng, [s for s in document.surfaces.values() if s.rig])
     local = np.tile(np.eye(4), (2, 1, 1)) + rng.uniform(-0.1, 0.1, (2, 4, 4))
@@ -365,6 +372,7 @@ MAKERS: dict[str, Maker] = {
     "contact.reshape": reshape,
     "contact.rotate": rotate,
     "contact.scale": scale,
+    "contact.settle": settle,
     "contact.transfer": transfer,
     "contact.translate": translate,
     "contact.ungroup": ungroup,

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact_builtins.solvers.sliding import SlidingPatch, SlidingTarget, sliding_problem, solve_sliding
 from contact_core.contact.axis import draw_axis
 from contact_core.contact.patch import parameterize_patch, reconstruct_patch
 from contact_core.contact.placement import Root
@@ -20,6 +19,7 @@ from contact_core.pose.black_box import Differentiable
 from contact_core.pose.body import Body, PairedPoints
 from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
 from contact_core.pose.problem import PoseProblem
+from contact_core.proposals.sliding import SlidingPatch, SlidingTarget, sliding_problem, solve_sliding
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import differences
 

@@ -12,7 +12,17 @@ from contact_core.edit.commands.organising import (
     Unpair,
 )
 from contact_core.edit.commands.painting import Detach, Erase, Extend, Paint, Remove, Reshape, Weigh
-from contact_core.edit.commands.placing import Bend, LinkPatch, Mirror, Rotate, Scale, Transfer, Translate, Unlink
+from contact_core.edit.commands.placing import (
+    Bend,
+    LinkPatch,
+    Mirror,
+    Rotate,
+    Scale,
+    Settle,
+    Transfer,
+    Translate,
+    Unlink,
+)
 from contact_core.edit.commands.surfaces import (
     AddSurface,
     ClearPose,
@@ -49,6 +59,7 @@ __all__ = [
     "Scale",
     "SetExtra",
     "SetPose",
+    "Settle",
     "Transfer",
     "Translate",
     "Ungroup",

@@ -8,9 +8,12 @@ from typing import ClassVar
 
 from contact_core.contact.placement import Link, Placement, Root
 from contact_core.document.document import ContactDocument, Patch
+from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.command import BaseCommand, Command, register_command
-from contact_core.edit.commands.checks import add_patches, check_placement
+from contact_core.edit.commands.checks import NamedPlacements, add_patches, check_placement
+from contact_core.edit.commands.surfaces import SetPose
 from contact_core.errors import CommandRejected
+from contact_core.pose.rig import Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +159,30 @@ class Transfer(BaseCommand):
             if patch.original:
                 raise CommandRejected(f"{patch.name!r} is a copy, so it cannot be the original of its shape.")
         return add_patches(document, self.patches)
+
+
+@register_command
+@dataclass(frozen=True, eq=False)
+class Settle(BaseCommand):
+    """Contacts moved and rigs posed together: what a proposal becomes when it is accepted.
+
+    placements: of patches, of the same kind as before. poses: by surface.
+    """
+
+    json_id: ClassVar[str] = "contact.settle"
+    placements: NamedPlacements
+    poses: FrozenMap[Pose]
+    title: str = "Settle contacts"
+
+    def label(self) -> str:
+        return self.title
+
+    def apply(self, document: ContactDocument) -> ContactDocument:
+        for name, placement in self.placements:
+            document = Translate(name, placement).apply(document)
+        for surface, pose in self.poses.items():
+            document = SetPose(surface, pose).apply(document)
+        return document
 
 
 @register_command

@@ -53,8 +53,10 @@ class SlidingPatch:
 
 @dataclass(frozen=True, eq=False)
 class SlidSolution:
-    """The pose, and where each patch went: roots by contact name. solution: of the problem with sliding targets."""
+    """The pose, and where each patch went: roots by contact name. solution: of the problem with sliding targets;
+    fixed: before anything slid."""
 
+    fixed: PoseSolution
     solution: PoseSolution
     roots: dict[str, Root]
 
@@ -224,4 +226,4 @@ def solve_sliding(
         target = together.bodies[index].black_box
         assert isinstance(target, SlidingTarget)
         roots[patch.contact] = target.root(together.full_theta(index, solution.theta))
-    return SlidSolution(solution, roots)
+    return SlidSolution(fixed, solution, roots)

@@ -1,0 +1,78 @@
+"""A draft of a document: verbs work on it one after the other, and nothing is committed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from contact_core.document.document import ContactDocument
+from contact_core.document.frozen_map import FrozenMap
+from contact_core.edit.command import Command, apply_command
+from contact_core.edit.commands import Settle
+from contact_core.edit.derived import Derived
+from contact_core.edit.verbs import Verbs
+from contact_core.pose.body import Body, PairedPoints
+from contact_core.pose.problem import PoseProblem
+from contact_core.pose.rig import Pose, Rig
+from contact_core.pose.terms import PoseTerm, paper_terms
+
+
+class Draft(Verbs):
+    """An editor of a document of its own. rigs: by surface."""
+
+    def __init__(self, document: ContactDocument, derived: Derived, rigs: Mapping[str, Rig]) -> None:
+        self._document, self._derived, self.rigs = document, derived, dict(rigs)
+
+    @property
+    def document(self) -> ContactDocument:
+        """The document as the draft has it now."""
+        return self._document
+
+    @property
+    def derived(self) -> Derived:
+        """Reconstructed geometry, cached."""
+        return self._derived
+
+    def submit(self, command: Command, *, origin: str = "user") -> int:
+        """Take a command into the draft; there are no revisions, so it answers 0."""
+        self._document = apply_command(command, self._document)
+        return 0
+
+    def problem(self, terms: tuple[PoseTerm, ...] = paper_terms()) -> PoseProblem:
+        """All pairs, every rig in its pose, everything else where it stands. The world is the scene in the units of
+        the first surface."""
+        pairs = self.pairs()
+        names = list(dict.fromkeys(s for pair in pairs for s in (pair.manipulator_surface, pair.object_surface)))
+        bodies = []
+        for name in names:
+            record = self.document.surface(name)
+            world = record.world_from_surface.copy()
+            world[:3] *= record.meters_per_unit / self.document.surface(names[0]).meters_per_unit
+            if name in self.rigs:
+                rig = self.rigs[name]
+                pose = self.document.poses.get(name) or Pose.rest(rig)
+                bodies.append(Body.skinned(rig, name=name, pose=pose, world_from_rig=world))
+            else:
+                bodies.append(Body.rigid(name, self.mesh(name), world_from_surface=world))
+        contacts = tuple(
+            PairedPoints(
+                pair.pair.name,
+                pair.manipulator_surface,
+                pair.manipulator_points,
+                pair.object_surface,
+                pair.object_points,
+                pair.weights,
+            )
+            for pair in pairs
+        )
+        return PoseProblem(tuple(bodies), contacts, terms)
+
+
+def change(before: ContactDocument, after: ContactDocument, title: str) -> Settle:
+    """The one command that takes a document to another, as far as placements and poses go."""
+    placements = tuple(
+        (name, patch.placement)
+        for name, patch in after.patches.items()
+        if before.patch(name).placement != patch.placement
+    )
+    poses = {name: pose for name, pose in after.poses.items() if before.poses.get(name) is not pose}
+    return Settle(placements, FrozenMap(poses), title)

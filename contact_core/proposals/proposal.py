@@ -1,0 +1,204 @@
+"""Two ways to move contacts together with the pose, for when transferred ones do not fit: settle and slide.
+
+Neither is ever silent: each answers a `Proposal`, a ghost that a person looks at and accepts as one undo step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contact_core.document.document import ContactDocument
+from contact_core.edit.commands import Settle
+from contact_core.errors import Cancelled, InvalidInput
+from contact_core.plugins.registry import PLACERS, POSE_SOLVERS
+from contact_core.plugins.slots import PlacementRequest
+from contact_core.pose.body import uniform_scale
+from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
+from contact_core.pose.problem import PoseProblem
+from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.pose.terms import PoseTerm, paper_terms
+from contact_core.proposals.draft import Draft, change
+from contact_core.proposals.sliding import SlidingPatch, solve_sliding
+
+if TYPE_CHECKING:
+    from contact_core.plugins.manager import PluginManager
+
+PLACER = "from pose"
+AGAIN = ("current",)  # starting candidates once there is a pose
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Contacts moved with a pose, not yet committed.
+
+    command: what accepting commits. ghost: the document with it, which adapters show. revision: of the document
+    that it was made for. before, after: solutions with the contacts where they were, and as proposed. left_out:
+    pairs that stay where they are, with the reason.
+    """
+
+    command: Settle
+    ghost: ContactDocument
+    revision: int
+    before: PoseSolution
+    after: PoseSolution
+    left_out: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class ProposalSettings:
+    """How to solve. solver: a name, None for the default. terms: of the objective."""
+
+    solver: str | None = None
+    options: SolveOptions | None = None
+    terms: tuple[PoseTerm, ...] = paper_terms()
+    progress: Progress | None = None
+
+    def solver_of(self, plugins: PluginManager) -> PoseSolver:
+        """The solver. Raises InvalidInput for an unknown name."""
+        return LevenbergMarquardt() if self.solver is None else plugins.get(POSE_SOLVERS, self.solver)
+
+
+def settle(
+    draft: Draft, plugins: PluginManager, revision: int, settings: ProposalSettings, rounds: int, reach: float
+) -> Proposal:
+    """Rounds of: every contact to the closest point that faces it on its object, then solve again.
+
+    The round with the lowest objective is proposed, only a pose where none improves on contacts left alone. reach:
+    contacts farther away than this stay, in manipulator lengths.
+    """
+    start, solver = draft.document, settings.solver_of(plugins)
+    problem, options = _problem_and_options(draft, settings)
+    before = after = _solved(draft, solver, problem, options, settings.progress)
+    best, left_out = draft.document, dict[str, str]()
+    for _ in range(rounds):
+        left_out = _place_all(draft, plugins, problem, reach)
+        again = replace(options, candidates=AGAIN)
+        solution = _solved(draft, solver, draft.problem(settings.terms), again, settings.progress)
+        if solution.value < after.value:
+            best, after = draft.document, solution
+    command = change(start, best, "Settle contacts")
+    return Proposal(command, best, revision, before, after, left_out)
+
+
+def slide(
+    draft: Draft,
+    plugins: PluginManager,
+    revision: int,
+    settings: ProposalSettings,
+    slack: float,
+    turn: float,
+    penalty: float,
+) -> Proposal:
+    """The pose and all contacts solved together: each may move on its surface within a slack (see `sliding`).
+
+    slack: in manipulator lengths. turn: radians.
+    """
+    start = draft.document
+    problem, options = _problem_and_options(draft, settings)
+    patches, left_out = _sliding_patches(draft, problem, slack, turn, penalty)
+    slid = solve_sliding(settings.solver_of(plugins), problem, patches, options, settings.progress)
+    _raise_if_cancelled(slid.solution)
+    for contact, root in slid.roots.items():
+        name = start.pairs[contact].object
+        draft.place(name, root.point(), heading=root.heading)
+    _take_poses(draft, slid.solution)
+    command = change(start, draft.document, "Slide contacts")
+    return Proposal(command, draft.document, revision, slid.fixed, slid.solution, left_out)
+
+
+def _problem_and_options(draft: Draft, settings: ProposalSettings) -> tuple[PoseProblem, SolveOptions]:
+    problem = draft.problem(settings.terms) if draft.document.pairs else None
+    if problem is None or not any(body.name in draft.rigs for body in problem.bodies):
+        raise InvalidInput(
+            "settling and sliding need contact pairs with a rig that can be posed: pair patches first."
+        )
+    posed = any(body.name in draft.document.poses for body in problem.bodies)
+    return problem, settings.options or (SolveOptions(candidates=AGAIN) if posed else SolveOptions())
+
+
+def _solved(
+    draft: Draft, solver: PoseSolver, problem: PoseProblem, options: SolveOptions, progress: Progress | None
+) -> PoseSolution:
+    solution = solver.solve(problem, options, progress)
+    _raise_if_cancelled(solution)
+    _take_poses(draft, solution)
+    return solution
+
+
+def _raise_if_cancelled(solution: PoseSolution) -> None:
+    if solution.status is SolveStatus.CANCELLED:
+        raise Cancelled("it was cancelled; nothing is proposed.")
+
+
+def _take_poses(draft: Draft, solution: PoseSolution) -> None:
+    for name in draft.rigs:
+        if name in solution.poses:
+            draft.set_pose(name, solution.poses[name])
+
+
+def _bends(draft: Draft, contact: str) -> str:
+    """Why a contact cannot move on its object, empty where it can."""
+    pair = draft.document.pairs[contact]
+    surfaces = [draft.document.patch(end).surface for end in (pair.manipulator, pair.object)]
+    if surfaces[1] in draft.rigs:
+        return f"{surfaces[1]} bends, and contacts only move on surfaces that stay as they are"
+    return "" if surfaces[0] in draft.rigs else f"{surfaces[0]} has no rig that is posed"
+
+
+def _place_all(draft: Draft, plugins: PluginManager, problem: PoseProblem, reach: float) -> dict[str, str]:
+    """One round: contacts to their closest facing points; answers those that stay, with the reason."""
+    left_out = {name: why for name in draft.document.pairs if (why := _bends(draft, name))}
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name, pair in draft.document.pairs.items():
+        if name not in left_out:
+            ends = draft.document.patch(pair.manipulator).surface, draft.document.patch(pair.object).surface
+            groups.setdefault(ends, []).append(name)
+    for (hand, thing), names in groups.items():
+        pairs = {name: draft.document.pairs[name] for name in names}
+        world = {body.name: body.world_from_rig for body in problem.bodies}
+        request = PlacementRequest(
+            rig=draft.rigs[hand],
+            pose=draft.document.poses[hand],
+            object_mesh=draft.mesh(thing),
+            object_from_rig=np.asarray(np.linalg.inv(world[thing]) @ world[hand]),
+            patch_points={name: draft.points(pair.manipulator) for name, pair in pairs.items()},
+            patch_axes={name: draft.axis(pair.manipulator).points for name, pair in pairs.items()},
+            options={"far": reach},
+        )
+        result = plugins.get(PLACERS, PLACER).place(request)
+        for name, place in result.placed.items():
+            draft.place(pairs[name].object, place.root, direction=place.direction)
+        left_out.update(result.left_out)
+    return left_out
+
+
+def _sliding_patches(
+    draft: Draft, problem: PoseProblem, slack: float, turn: float, penalty: float
+) -> tuple[list[SlidingPatch], dict[str, str]]:
+    document, patches, left_out = draft.document, [], {}
+    for contact, pair in document.pairs.items():
+        patch, reason = document.patch(pair.object), _bends(draft, contact)
+        if not reason and patch.shape != document.patch(pair.manipulator).shape:
+            reason = "its two patches were painted apart, and share no shape"
+        if reason:
+            left_out[contact] = reason
+            continue
+        body = problem.bodies[problem.body_index(patch.surface)]
+        patches.append(
+            SlidingPatch(
+                contact,
+                document.shapes[patch.shape],
+                draft.root(pair.object),
+                slack * problem.manipulator_length / uniform_scale(body.world_from_rig),
+                turn=turn,
+                penalty=penalty,
+                mirrored=patch.mirrored,
+                unit=draft.derived.unit(document, pair.object),
+                axis=document.effective_axis(pair.object),
+            )
+        )
+    return patches, left_out
