@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,17 @@ import pytest
 pytest_plugins = ["pytester"]
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+MOST_MEMORY = 8 * 2**30  # bytes of address space a process: what grows without bound fails its own test
+
+
+def pytest_configure() -> None:
+    """On Linux, a test that asks for too much memory gets a MemoryError, and the machine stays up."""
+    if sys.platform == "linux":
+        import resource
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        if soft == resource.RLIM_INFINITY or soft > MOST_MEMORY:
+            resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, hard))
 
 
 @pytest.fixture(scope="session")
