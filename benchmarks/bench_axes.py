@@ -1,6 +1,6 @@
 """Default axes against axes drawn by hand: agreement and transfer distortion, for every built-in hand.
 
-    python benchmarks/bench_axes.py [--picture docs/images/axis_generators.png]
+    python benchmarks/bench_axes.py [--picture docs/images/axis_generators.png | --held-out rigs/NAME.glb]
 
 For each patch of reference_axes.toml, painted by the disk brush, and for each generator: the angle between its
 axis and the reference (0 to 180 degrees: a wrong sign counts), how far the middles lie apart (in brush radii),
@@ -26,13 +26,13 @@ from contact_core.document.asset import Asset
 from contact_core.geometry import SurfacePoints, TriangleMesh, exact_geodesic
 from contact_core.geometry.raycast import Locator
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, RENDERERS, SAMPLES
+from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, FORMATS, RENDERERS, SAMPLES
 from contact_core.plugins.slots import Picture, PictureMesh
 from contact_core.pose.bones import bones_of
 from contact_core.session import Session
 
 HERE = Path(__file__).parent
-KINDS = ("tip", "pad", "palm", "band")
+KINDS = ("tip", "pad", "palm", "band", "side", "crease", "heel", "edge")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +50,9 @@ class Painted:
         return self.name.rpartition("_")[2]
 
 
-def painted(hand: str, asset: Asset, plugins: PluginManager) -> list[Painted]:
-    """The patches of one hand."""
-    table = tomllib.loads((HERE / "reference_axes.toml").read_text(encoding="utf-8"))[hand]
+def painted(hand: str, asset: Asset, plugins: PluginManager, references: str) -> list[Painted]:
+    """The patches of one hand in a file of references."""
+    table = tomllib.loads((HERE / references).read_text(encoding="utf-8"))[hand]
     brush, locator = plugins.get(BRUSHES, "disk"), Locator.of(asset.mesh)
     result = []
     for name, entry in table.items():
@@ -128,14 +128,17 @@ def picture(asset: Asset, patches: list[Painted], drawn: dict[str, SurfacePoints
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--picture", type=Path, help="where to write the hands side by side")
+    parser.add_argument("--held-out", type=Path, help="a glTF hand of held_out_axes.toml, in place of the samples")
     arguments = parser.parse_args()
     plugins = PluginManager()
     ball = plugins.get(SAMPLES, "baseball").build().mesh
     found: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
     pictures = []
-    for hand in ("human_hand", "witch_hand", "alien_hand"):
-        asset = plugins.get(SAMPLES, hand).build()
-        patches = painted(hand, asset, plugins)
+    held_out = arguments.held_out
+    references = "held_out_axes.toml" if held_out else "reference_axes.toml"
+    for hand in (held_out.stem,) if held_out else ("human_hand", "witch_hand", "alien_hand"):
+        asset = plugins.get(FORMATS, "gltf").read(held_out) if held_out else plugins.get(SAMPLES, hand).build()
+        patches = painted(hand, asset, plugins, references)
         for name, generator in plugins.offers(AXIS_GENERATORS).items():
             drawn = generated(asset, patches, generator)
             for patch in patches:
@@ -147,6 +150,8 @@ def main() -> None:
     for name in plugins.offers(AXIS_GENERATORS):
         for kind in KINDS:
             rows = found[name, kind]
+            if not rows:
+                continue
             angle, offset, median, worst, folds = (
                 np.array([row[key] for row in rows]) for key in ("angle", "offset", "median", "worst", "folds")
             )
