@@ -4,7 +4,6 @@ import numpy as np
 
 from contact_core.contact.brush import BrushGesture
 from contact_core.geometry.raycast import Locator
-from contact_core.plugins.registry import BRUSHES
 from contact_core.session import Session
 from contact_core.testing import meshes
 
@@ -17,8 +16,8 @@ with Session() as session:
 
     # A stroke along the finger's side, painted by the disk brush: even points, whatever the mesh's density.
     stroke = Locator.of(finger).closest([(0.5, 0.0, z) for z in np.linspace(0.8, 3.2, 7)]).points
-    mark = session.plugins.get(BRUSHES, "disk").mark(BrushGesture(finger, stroke, radius=0.25, spacing=0.08))
-    session.paint("pad", mark.points, surface="finger", axis=stroke)
+    gesture = BrushGesture(finger, stroke, radius=0.25, spacing=0.08)
+    session.brush("disk", "pad", gesture, surface="finger", axis=stroke)
 
     # The same contact on the pole, first along it and then turned, so that it winds round like a helix.
     root = Locator.of(pole).closest([(0.8, 0.0, 5.0)]).points
@@ -26,7 +25,7 @@ with Session() as session:
     heights = [np.ptp(session.points(on_pole).positions(pole)[:, 2])]
     session.rotate(on_pole, np.radians(60.0))
     heights.append(np.ptp(session.points(on_pole).positions(pole)[:, 2]))
-    print(f"{len(mark.points)} points, {heights[0]:.2f} high along the pole")
+    print(f"{len(session.points('pad'))} points, {heights[0]:.2f} high along the pole")
     print(f"{heights[1]:.2f} high after a turn by 60 degrees")
 
     session.undo()
