@@ -1,0 +1,160 @@
+"""A host's rig for a solve: analytic where that is exact, else evaluated by the host itself, and said in words.
+
+found = body_of(host, "hand")
+problem = PoseProblem(bodies=(found.body, ...), ...)
+pose = found.pose(solution)        # for host.write_pose
+found.notes                        # why the host evaluates, if it does
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from contact_core.arrays import FloatArray
+from contact_core.errors import InvalidInput
+from contact_core.host import RigReading, SceneReading
+from contact_core.pose.black_box import BlackBoxDof, DeformedSkin
+from contact_core.pose.body import Body
+from contact_core.pose.chart import Chart
+from contact_core.pose.rig import Pose, Rig, forward_kinematics, skin
+from contact_core.pose.solver import PoseSolution
+
+TOLERANCE = 1e-4  # of the skin's diagonal: single precision of hosts stays well below
+PROBES = 3  # bent poses that are compared
+BEND = 0.5  # radians
+_STEP = 1e-3  # radians, or of the rig's size: well above what single precision makes of a vertex
+
+
+class EvaluatingHost(SceneReading, RigReading, Protocol):
+    """A host that evaluates skins."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinCheck:
+    """The analytic skin against the host's own. largest: distance (surface units) over all probes, at `vertex`.
+
+    share: of the diagonal of the skin at rest.
+    """
+
+    largest: float
+    vertex: int
+    share: float
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether linear skinning reproduces what the host evaluates."""
+        return self.share <= TOLERANCE
+
+
+@dataclass(frozen=True, eq=False)
+class HostBody:
+    """A body, and sentences on why it is the host that evaluates it (none where it is analytic)."""
+
+    body: Body
+    check: SkinCheck
+    notes: tuple[str, ...]
+
+    def pose(self, solution: PoseSolution) -> Pose:
+        """The pose of all joints out of a solution with this body."""
+        solved = solution.poses[self.body.name]
+        return self.body.black_box.pose(solved) if isinstance(self.body.black_box, EvaluatedRig) else solved
+
+
+def body_of(host: EvaluatingHost, object_id: str, name: str | None = None) -> HostBody:
+    """The rig of a host as a body where it stands, after one comparison of skins; see `check_skin`."""
+    asset, check = host.read_rig(object_id), check_skin(host, object_id)
+    assert asset.rig is not None  # read_rig fills it
+    name = name or asset.name
+    if check.is_exact:
+        placed = host.placement(object_id)
+        body = Body.skinned(asset.rig, name=name, pose=host.read_pose(object_id), world_from_rig=placed)
+        return HostBody(body, check, ())
+    note = (
+        f"the skin of {name} is not linear blend skinning of its joints: the host puts vertex {check.vertex}"
+        f" {check.largest:.3g} away ({100.0 * check.share:.2g} % of the skin's size). The host evaluates it"
+        " during the solve, which is slower."
+    )
+    return HostBody(Body.evaluated(name, EvaluatedRig(host, object_id)), check, (note,))
+
+
+def check_skin(host: RigReading, object_id: str) -> SkinCheck:
+    """Compare skins in the pose of the scene and in bent poses within the limits. The scene is left as it was.
+
+    Raises InvalidInput where the host's skin has other vertices.
+    """
+    asset = host.read_rig(object_id)
+    assert asset.rig is not None
+    largest, vertex = 0.0, 0
+    for pose in (host.read_pose(object_id), *probes(asset.rig)):
+        theirs, ours = host.skin_points(object_id, pose), skin_in(asset.rig, pose)
+        if theirs.shape != ours.shape:
+            raise InvalidInput(f"the host evaluates {len(theirs)} vertices of {asset.name}, and reads {len(ours)}.")
+        away = np.linalg.norm(theirs - ours, axis=1)
+        if len(away) and away.max() > largest:
+            largest, vertex = float(away.max()), int(away.argmax())
+    return SkinCheck(largest, vertex, largest / (asset.rig.surface.bounding_box_diagonal or 1.0))
+
+
+def probes(rig: Rig) -> tuple[Pose, ...]:
+    """Poses that bend every free joint a little, within its limits; the same at each call."""
+    chart, random = Chart(rig), np.random.default_rng(1)
+    start, leftover = chart.theta_of(Pose.rest(rig))
+    turns = ~chart.locked & ~chart.is_translation
+    poses = []
+    for _ in range(PROBES):
+        theta = start + np.where(turns, random.uniform(-BEND, BEND, chart.size), 0.0)
+        theta = np.where(turns, np.clip(theta, chart.lower, chart.upper), start)
+        poses.append(Pose(rig.joints, chart.local(theta, leftover)))
+    return tuple(poses)
+
+
+def skin_in(rig: Rig, pose: Pose) -> FloatArray:
+    """(n, 3) the analytic skin in a pose, rig space."""
+    local = rig.rest_local.copy()
+    for joint, matrix in zip(pose.joints, pose.local, strict=True):
+        local[rig.joint_index(joint)] = matrix
+    return skin(rig, forward_kinematics(rig.parents, local))
+
+
+class EvaluatedRig(DeformedSkin):
+    """The dofs of the rig that the host reads, unlocked ones only; points in the world from `skin_points`."""
+
+    def __init__(self, host: EvaluatingHost, object_id: str) -> None:
+        asset = host.read_rig(object_id)
+        assert asset.rig is not None  # read_rig fills it
+        self.chart = Chart(asset.rig)
+        self._free = np.flatnonzero(~self.chart.locked)
+        self._start, self._leftover = self.chart.theta_of(host.read_pose(object_id))
+        place, size = host.placement(object_id), asset.rig.surface.bounding_box_diagonal
+
+        def deform(theta: FloatArray) -> FloatArray:
+            points = host.skin_points(object_id, self._pose_at(theta))
+            return np.asarray(points @ place[:3, :3].T + place[:3, 3])
+
+        super().__init__(asset.rig.surface, [self._dof(int(q), size) for q in self._free], deform, size)
+
+    def pose(self, solved: Pose) -> Pose:
+        """The joints' pose out of what a solver answers for a black box: its dofs by name."""
+        value = dict(zip(solved.joints, solved.local[:, 0, 3].tolist(), strict=True))
+        return self._pose_at(np.array([value[dof.name] for dof in self.dofs]))
+
+    def _pose_at(self, theta: FloatArray) -> Pose:
+        """theta: (free,); locked dofs stay where they were found."""
+        whole = self._start.copy()
+        whole[self._free] = theta
+        return Pose(self.chart.rig.joints, self.chart.local(whole, self._leftover))
+
+    def _dof(self, q: int, size: float) -> BlackBoxDof:
+        chart, length = self.chart, bool(self.chart.is_translation[q])
+        return BlackBoxDof(
+            chart.dof_names[q],
+            float(chart.lower[q]),
+            float(chart.upper[q]),
+            float(chart.prior_weight[q]),
+            is_translation=length,
+            is_root=bool(chart.is_root[q]),
+            step=_STEP * (size if length else 1.0),
+        )
