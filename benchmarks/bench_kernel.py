@@ -1,6 +1,6 @@
 """The geodesic kernel beside every peer that pip installs, in one process, in turn.
 
-    python -m benchmarks.bench_kernel [--quick]
+    python -m benchmarks kernel [--quick]
 
 Workload W: a geodesic disk of radius 5% of the bounding-box diagonal on the Stanford bunny, 500 random points in
 it, an axis of 20 points across; on the mesh as it is and subdivided at the midpoints. Needs $CONTACT_ASSETS or
@@ -10,7 +10,6 @@ it, an axis of 20 points across; on the mesh as it is and subdivided at the midp
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import resource
 import subprocess
@@ -74,6 +73,23 @@ class Workload:
         trace_chains(self.mesh, self.axis[log.anchor], log.first_leg, log.offsets, log.turning_angles, log.lengths)
 
 
+class _WideResults:
+    """numpy, as pygeodesic sees it.
+
+    pygeodesic marks a vertex out of reach by 2**32 - 1 in an int32 array: numpy 1 wraps that, numpy 2 refuses it
+    (OverflowError). Room for the number gives the peer its bounded call back, at the same cost.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(np, name)
+
+    def zeros(self, shape: Any, dtype: Any) -> Any:
+        return np.zeros(shape, np.int64 if dtype is np.int32 else dtype)
+
+
+geodesic.numpy = _WideResults()
+
+
 def vertices_of(mesh: TriangleMesh, points: SurfacePoints) -> np.ndarray:
     """(k,) the corner nearest to each point: peers start at vertices."""
     return mesh.faces[points.faces, points.barycentric.argmax(axis=1)].astype(np.int32)
@@ -82,8 +98,8 @@ def vertices_of(mesh: TriangleMesh, points: SurfacePoints) -> np.ndarray:
 def parameterize(rounds: int, levels: int) -> dict[str, Any]:
     """W against pygeodesic, on the mesh and its subdivisions.
 
-    The peer answers for the vertices nearest to the points, and stops there: that is less than its radius alone,
-    and with a radius alone it raises OverflowError for vertices out of reach.
+    Its bounded call (max_distance alone) answers for every vertex of the mesh, inf beyond the reach. Asked for the
+    vertices nearest to the points only, it answers for these; both clear data of the whole mesh first.
     """
     rows: dict[str, Any] = {}
     for level in range(levels):
@@ -91,46 +107,45 @@ def parameterize(rounds: int, levels: int) -> dict[str, Any]:
         mesh, name = work.mesh, f"W at {len(work.mesh.faces)} faces"
         peer = geodesic.PyGeodesicAlgorithmExact(mesh.points.copy(), mesh.faces.astype(np.int32))
         sources, targets = vertices_of(mesh, work.axis), vertices_of(mesh, work.points)
-        reach = 1.1 * float(work.log.distance.max())
+        reach = float(work.log.distance.max())
 
-        def one_call(
-            peer: Any = peer, sources: Any = sources, targets: Any = targets, reach: float = reach
-        ) -> None:
-            peer.geodesicDistances(sources, targets, reach)
-
-        def radius_alone(peer: Any = peer, batches: Any = (sources,), reach: float = reach) -> None:
+        def call(targets: Any = None, reach: float = reach, batches: Any = (sources,), peer: Any = peer) -> None:
             for batch in batches:
-                with contextlib.suppress(OverflowError):  # it searches, then fails on the first vertex out of reach
-                    peer.geodesicDistances(batch, None, reach)
+                peer.geodesicDistances(batch, targets, reach)
 
-        each = np.split(sources, len(sources))
-        contestants = {
+        contestants: dict[str, Any] = {
             "ours": work.parameterize,
             "trace": work.reconstruct,
-            "one call": one_call,
-            "radius": radius_alone,
+            "bounded": call,
+            "targets": lambda call=call, targets=targets: call(targets),
         }
         if level == 0:
+            each = np.split(sources, len(sources))
             contestants |= {
-                "20 calls": lambda each=each, call=radius_alone: call(batches=each),
-                "zero radius": lambda call=radius_alone: call(reach=1e-9),
+                "20 calls": lambda call=call, each=each: call(batches=each),
+                "20 calls, targets": lambda call=call, each=each, targets=targets: call(targets, batches=each),
+                "zero radius": lambda call=call: call(reach=1e-9),
             }
         times = interleaved(contestants, rounds)
         rows[f"{name}: parameterize, ms median (best)"] = (
             f"{1e3 * times['ours'].median:.2f} ({1e3 * times['ours'].best:.2f})"
         )
         rows[f"{name}: times faster than pygeodesic's one bounded call (bar on the first: 5)"] = ratio(
-            times["one call"], times["ours"]
+            times["bounded"], times["ours"]
+        )
+        rows[f"{name}: times faster than that call asked for the vertices nearest to the points only"] = ratio(
+            times["targets"], times["ours"]
         )
         if level == 0:
-            rows[f"{name}: times faster than pygeodesic, one call per axis point"] = ratio(
+            rows[f"{name}: times faster than pygeodesic, a bounded call per axis point"] = ratio(
                 times["20 calls"], times["ours"]
             )
-            rows[f"{name}: pygeodesic at zero radius, ms"] = 1e3 * times["zero radius"].median
-        rows[f"{name}: times faster than its search within the radius, which ends in an OverflowError"] = ratio(
-            times["radius"], times["ours"]
-        )
-        rows[f"{name}: pygeodesic's one call, ms"] = 1e3 * times["one call"].median
+            rows[f"{name}: times faster than those calls asked for the nearest vertices only"] = ratio(
+                times["20 calls, targets"], times["ours"]
+            )
+            rows[f"{name}: pygeodesic's bounded call at zero radius, ms"] = 1e3 * times["zero radius"].median
+        rows[f"{name}: pygeodesic's bounded call, ms"] = 1e3 * times["bounded"].median
+        rows[f"{name}: pygeodesic asked for the nearest vertices only, ms"] = 1e3 * times["targets"].median
         rows[f"{name}: reconstruct 500 points, ms median (best)"] = (
             f"{1e3 * times['trace'].median:.2f} ({1e3 * times['trace'].best:.2f})"
         )

@@ -43,6 +43,14 @@ class TriangleMesh:
         return digest(np.array([len(self.points)]), self.faces)
 
     @cached_property
+    def first_corners(self) -> IntArray:
+        """(n,) the first corner 3 f + k of face f that is each vertex; -1 where no face uses it."""
+        corners = np.full(len(self.points), -1, np.int64)
+        flat = self.faces.ravel()
+        corners[flat[::-1]] = np.arange(len(flat) - 1, -1, -1)
+        return corners
+
+    @cached_property
     def bounding_box_diagonal(self) -> float:
         """Length of the diagonal of the box round the points that faces use (surface units)."""
         used = self.points[np.unique(self.faces)] if len(self.faces) else self.points

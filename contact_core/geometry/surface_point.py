@@ -91,14 +91,11 @@ class SurfacePoints:
     def at_vertices(cls, mesh: TriangleMesh, vertices: Any) -> SurfacePoints:
         """The given vertices (k,) as surface points, each in its first face. Raises InvalidInput if unused."""
         wanted = np.atleast_1d(np.asarray(vertices, dtype=np.int64))
-        if len(wanted) and (wanted.min() < 0 or wanted.max() >= len(mesh.points)):
-            raise InvalidInput(
-                f"vertices must be in 0..{len(mesh.points) - 1}, but {int(wanted[0])} came among them."
-            )
-        corner_of_vertex = np.full(len(mesh.points), -1, np.int64)
-        flat = mesh.faces.ravel()
-        corner_of_vertex[flat[::-1]] = np.arange(len(flat) - 1, -1, -1)
-        corners = corner_of_vertex[wanted]
+        outside = (wanted < 0) | (wanted >= len(mesh.points))
+        if outside.any():
+            bad = int(wanted[np.argmax(outside)])
+            raise InvalidInput(f"vertices must be in 0..{len(mesh.points) - 1}, but {bad} came among them.")
+        corners = mesh.first_corners[wanted]
         if (corners < 0).any():
             raise InvalidInput(f"vertex {int(wanted[np.argmax(corners < 0)])} belongs to no face.")
         return cls(corners // 3, np.eye(3)[corners % 3])

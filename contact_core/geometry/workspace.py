@@ -23,7 +23,8 @@ class Workspace:
     leg: (n, 3) last leg to the vertex in the root's wedge frame; angle round the vertex of the way back.
     claim: (3m, 3) per entered halfedge: epoch, distance to the apex, where the ray to the apex crosses.
     listed: (m, 2) epoch, first target of the face.
-    floats, integers: window records.  keys, items: heap, four children a node.  state: counters.  See `window_kernels`.
+    floats, integers: window records.  keys, items: heap, four children a node.  state: counters.  All of these as
+    in `window_kernels`.
     """
 
     def __init__(self, point_count: int, face_count: int) -> None:
