@@ -24,6 +24,7 @@ from contact_builtins.solvers.stepwise import MultiStartSolver
 from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Root
 from contact_core.geometry.distance_field import DistanceField
+from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import Job, prepare
 from contact_core.job.solving import pose_problem
 from contact_core.plugins.manager import PluginManager
@@ -34,7 +35,8 @@ from contact_core.pose.solver import PoseSolution, SolveOptions, patch_residuals
 from contact_core.proposals.sliding import SlidingPatch, SlidSolution, solve_sliding
 
 HERE = Path(__file__).resolve().parent
-GRIPS = ("baseball", "pole", "mug")
+GRIPS = ("baseball", "pole", "mug")  # of `contact demo`
+EXAMPLES = ("01_ball_fingertips", "04_bunny")  # with meshes that this repository does not hold
 NEAR = 1.02  # of the best objective known
 
 
@@ -44,7 +46,8 @@ class Grip:
     def __init__(self, name: str) -> None:
         plugins = PluginManager([contact_builtins], discover=False)
         self.name = name
-        self.job: Job = prepare(demo_recipe(name), plugins)
+        recipe = demo_recipe(name) if name in GRIPS else load_recipe(HERE.parent / "examples" / f"{name}.toml")
+        self.job: Job = prepare(recipe, plugins)
         self.problem = pose_problem(self.job, plugins, self.job.start)
         self.fields = [DistanceField.of(s, resolution=128) for s in self.job.solids or (self.job.object.mesh,)]
 
@@ -140,8 +143,8 @@ def placements(grip: Grip, count: int, starts: int) -> str:
 
 HEAD = """# Grips, measured
 
-Written by `python benchmarks/pose_grips.py`; run it again to check. Built-in hand and objects, recipes of
-`contact demo`; lengths in % of the hand's length, times in milliseconds.
+Written by `python benchmarks/pose_grips.py`; run it again to check. Recipes of `contact demo`, on
+built-in assets, and of `examples/`; lengths in % of the hand's length, times in milliseconds.
 """
 
 
@@ -149,9 +152,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--placements", type=int, default=50)
     parser.add_argument("--starts", type=int, default=200)
+    parser.add_argument("--examples", nargs="*", default=EXAMPLES, help="recipes of examples/; none without assets")
     parser.add_argument("--out", type=Path, default=HERE.parent / "docs")
     given = parser.parse_args()
-    grips = [Grip(name) for name in GRIPS]
+    grips = [Grip(name) for name in (*GRIPS, *given.examples)]
     text = [HEAD, "## The penetration term", ""]
     text += ["| | deepest without | with | distance without | with | solve, ms | more, ms |", "|---" * 7 + "|"]
     text += [penetration(grip) for grip in grips]
