@@ -6,7 +6,8 @@ edge) and a rotation from that frame to the root's, so that length and initial d
 of the face are |p - S| and (p - S) * rotation. Windows leave a heap in order of distance (Chen and Han 1990,
 improved by Xin and Wang 2009): a window whose cone holds the apex splits in two, but of all windows that enter
 through h only the one that is nearest to the apex keeps both children (`claim`); and a window that the vertices
-round it outdo is dropped.
+round it outdo is dropped. Light that comes twice with one image (mirror ways round a fold) goes on once: without
+that, windows double at every fold.
 
 Work arrays belong to a mesh and are never cleared: what carries an older epoch counts as empty, so a query touches
 no more memory than its region has. Indices: see `workspace.Workspace`.
@@ -226,11 +227,20 @@ def propagate(
         if sharp:  # one angle, one split
             crossing = sx - rx * sy / ry if ry > 0.0 else sx
             split_distance, split_crossing = distance, crossing
-            if claim[h, 0] != epoch or distance < claim[h, 1]:
-                claim[h, 0], claim[h, 1], claim[h, 2] = epoch, distance, crossing
-            elif distance * SURELY > claim[h, 1]:
-                left = crossing < claim[h, 2] + GRAZING * length
-                right = crossing > claim[h, 2] - GRAZING * length
+            held, crossed = claim[h, 1], claim[h, 2]
+            if claim[h, 0] != epoch:
+                claim[h, 0], claim[h, 1], claim[h, 2], claim[h, 3], claim[h, 4] = epoch, distance, crossing, b0, b1
+            elif (
+                max(distance, held) * SURELY <= min(distance, held) and abs(crossing - crossed) <= GRAZING * length
+            ):
+                # the same light again, by another way of the same length: on each side the wider window goes on
+                left, right = b0 < claim[h, 3] - GRAZING * length, b1 > claim[h, 4] + GRAZING * length
+                claim[h, 3], claim[h, 4] = min(b0, claim[h, 3]), max(b1, claim[h, 4])
+            elif distance < held:
+                claim[h, 1], claim[h, 2], claim[h, 3], claim[h, 4] = distance, crossing, b0, b1
+            elif distance * SURELY > held:
+                left = crossing < crossed + GRAZING * length
+                right = crossing > crossed - GRAZING * length
     if left:
         ux, uy = ax / left_length, ay / left_length
         t0 = 0.0 if b0 == 0.0 else left_length * sy * b0 / (ax * sy + ay * (b0 - sx))

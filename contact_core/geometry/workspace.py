@@ -21,7 +21,7 @@ class Workspace:
 
     reach: (n, 2) epoch, distance.  origin: (n, 3) root, wedge, 1 once the vertex is a root itself.
     leg: (n, 3) last leg to the vertex in the root's wedge frame; angle round the vertex of the way back.
-    claim: (3m, 3) per entered halfedge: epoch, distance to the apex, where the ray to the apex crosses.
+    claim: (3m, 5) per entered halfedge: epoch, distance to the apex, where the ray to the apex crosses, interval.
     listed: (m, 2) epoch, first target of the face.
     floats, integers: window records.  keys, items: heap, four children a node.  state: counters.  All of these as
     in `window_kernels`.
@@ -32,7 +32,7 @@ class Workspace:
         self.reach: FloatArray = np.zeros((point_count, 2))
         self.leg: FloatArray = np.zeros((point_count, 3))
         self.origin: IntArray = np.zeros((point_count, 3), np.int64)
-        self.claim: FloatArray = np.zeros((3 * face_count, 3))
+        self.claim: FloatArray = np.zeros((3 * face_count, 5))
         self.listed: FloatArray = np.zeros((face_count, 2))
         self.state: IntArray = np.zeros(6, np.int64)
         self.reserve(4096)

@@ -1,4 +1,9 @@
-"""Faces without area (collapsed edges, three corners on a line): a sentence or a right answer, never a lie."""
+"""Faces without area: a sentence or a right answer, never NaN, never a hang.
+
+Edges of no length are merged by the topology and every law goes on. Three corners on a line are walked through; a
+path that bends just there may trace up to some 1e-3 of the diagonal beside its target (docs/adr/0012), so only
+finite answers are promised for them here.
+"""
 
 from __future__ import annotations
 
@@ -19,36 +24,61 @@ def rounded(name: str, steps: int) -> TriangleMesh:
     return mesh.with_points(np.round(mesh.points * steps) / steps)
 
 
-@given(data=st.data(), name=family_names(), steps=st.integers(2, 8))
-@settings(max_examples=40, deadline=None)
-def test_log_then_exp_on_collapsed_meshes(data: st.DataObject, name: str, steps: int) -> None:
-    mesh = rounded(name, steps)
+def with_collapsed_edges(name: str, seed: int, count: int = 6) -> TriangleMesh:
+    """A family in which some edges have no length: two vertices each at one place, their faces without area."""
+    mesh = cached_family(name)
+    points = mesh.points.copy()
+    random = np.random.default_rng(seed)
+    free = np.ones(len(points), bool)
+    for face in random.permutation(len(mesh.faces))[: 20 * count]:
+        a, b, _ = mesh.faces[face]
+        around = np.unique(mesh.faces[np.isin(mesh.faces, (a, b)).any(axis=1)])
+        if free[around].all() and count:
+            points[b] = points[a]
+            free[around] = False
+            count -= 1
+    return mesh.with_points(points)
+
+
+def names_a_place(refusal: ContactError) -> bool:
+    return any(word in str(refusal) for word in ("face", "edge", "vertex"))
+
+
+@given(data=st.data(), name=family_names(without=("sliver",)), seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=60, deadline=None)
+def test_log_then_exp_across_edges_without_length(data: st.DataObject, name: str, seed: int) -> None:
+    mesh = with_collapsed_edges(name, seed)
     sources, targets = data.draw(surface_points(mesh, 2)), data.draw(surface_points(mesh, 4))
     try:
         log = log_map(mesh, sources, targets)
-        assert np.isfinite(log.coordinates).all() and np.isfinite(log.headings).all()
-        there = log.anchor >= 0
-        if there.all():
-            end = trace_chains(
-                mesh, sources[log.anchor], log.first_leg, log.offsets, log.turning_angles, log.lengths
-            ).points.positions(mesh)
-            miss = np.linalg.norm(end - targets.positions(mesh), axis=1).max()
-            assert miss <= 1e-7 * mesh.bounding_box_diagonal
+        end = trace_chains(mesh, sources[log.anchor], log.first_leg, log.offsets, log.turning_angles, log.lengths)
     except ContactError as refusal:
-        assert "face" in str(refusal) or "edge" in str(refusal) or "vertex" in str(refusal)
+        assert names_a_place(refusal)
+        return
+    assert log.pops <= 60 * len(mesh.faces), (
+        "the same light by several ways of one length goes on once, not doubling"
+    )
+    miss = np.linalg.norm(end.points.positions(mesh) - targets.positions(mesh), axis=1).max()
+    assert miss <= 1e-7 * mesh.bounding_box_diagonal
 
 
 @given(data=st.data(), name=family_names(), steps=st.integers(2, 8), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
-def test_traces_on_collapsed_meshes_are_finite(data: st.DataObject, name: str, steps: int, seed: int) -> None:
+@settings(max_examples=60, deadline=None)
+def test_answers_on_collapsed_meshes_are_finite(data: st.DataObject, name: str, steps: int, seed: int) -> None:
     mesh = rounded(name, steps)
-    starts = data.draw(surface_points(mesh, 3))
+    starts, targets = data.draw(surface_points(mesh, 3)), data.draw(surface_points(mesh, 3))
     random = np.random.default_rng(seed)
     vectors = (random.standard_normal(3) + 1j * random.standard_normal(3)) * mesh.bounding_box_diagonal
     try:
         trace = trace_geodesic(mesh, starts, vectors)
+        log = log_map(mesh, starts, targets)
     except ContactError as refusal:
-        assert "face" in str(refusal) or "edge" in str(refusal) or "vertex" in str(refusal)
+        assert names_a_place(refusal)
         return
     assert np.isfinite(trace.points.barycentric).all()
     np.testing.assert_allclose(np.abs(trace.headings), 1.0, atol=1e-9)
+    assert np.isfinite(log.coordinates).all() and np.isfinite(log.headings).all()
+    positions = starts.positions(mesh)
+    reached = log.anchor >= 0
+    chord = np.linalg.norm(targets.positions(mesh)[reached] - positions[log.anchor[reached]], axis=1)
+    assert (chord <= log.distance[reached] + 1e-9 * mesh.bounding_box_diagonal).all()
