@@ -41,12 +41,15 @@ from contact_core.geometry.window_kernels import (
     OVERFLOW,
     POPS,
     ROOT,
+    SHORTER_LEG,
     SIGMA,
     SIN,
     SLACK,
+    SURELY,
     SX,
     SY,
     WEDGE,
+    bends_paths,
     distance_at,
     emit_shadow,
     emit_source,
@@ -68,7 +71,6 @@ ON, ELEMENT, NEXT, TARGET_ROOT, TARGET_WEDGE, ARRIVAL = (
 # A way that only grazes its window is preferred to another one if it is shorter by more than this: it may in truth
 # be the way round the vertex that it grazes.
 GRAZING_RANK = 1.0 + 1e-11
-CORNER_RANK = 1.0 + 1e-14  # and of equal ways the straight one is preferred to that through a corner
 CHECK_EVERY = constant(64)  # pops, at least, between two looks at the targets
 
 
@@ -110,10 +112,16 @@ def offer(
     t: int, rank: float, distance: float, root: int, wedge: int, zx: float, zy: float, h: int, dx: float, dy: float,
     target_floats: FloatArray, target_integers: IntArray,
 ) -> None:  # fmt: skip
-    """Give target t a way that is better than the one it has; direction (dx, dy) in the frame of h."""
-    if rank >= target_floats[t, RANK]:
-        return
+    """Give target t a way that is better than the one it has; direction (dx, dy) in the frame of h.
+
+    Of two ways of one length the better has the shorter last leg: where a straight way passes a saddle, the way
+    that bends there is as long, and only that one can be walked, for a walk parts the angles at a vertex.
+    """
     row = target_floats[t]
+    if rank > row[RANK] * SURELY and (
+        rank * SURELY > row[RANK] or norm(zx, zy) >= norm(row[ZX], row[ZY]) * SHORTER_LEG
+    ):
+        return
     row[RANK], row[DISTANCE], row[ZX], row[ZY], row[DX], row[DY] = rank, distance, zx, zy, dx, dy
     target_integers[t, TARGET_ROOT], target_integers[t, TARGET_WEDGE] = root, wedge
     target_integers[t, ARRIVAL] = h
@@ -334,10 +342,11 @@ def read_targets(
                 way = distance_at(tail[base + k], epoch, reach)
                 if 0.0 < way < math.inf:
                     way += norm(x, y)
+                    if way >= row[RANK] * SURELY and not bends_paths(tail[base + k], angle_sum, kind):
+                        continue  # straight on through a flat corner: the way is not cut in two there
                     offer(
-                        t, way * CORNER_RANK, way, tail[base + k], base + k, x, y, base + k, x, y,
-                        target_floats, target_integers,
-                    )  # fmt: skip
+                        t, way, way, tail[base + k], base + k, x, y, base + k, x, y, target_floats, target_integers
+                    )
             distance[t] = row[DISTANCE] if row[RANK] < math.inf else math.inf
             if 0.0 < distance[t] <= limit and distance[t] < math.inf:
                 headings[t, 0], headings[t, 1] = heading_at(

@@ -61,6 +61,7 @@ EXCESS = 1e-11  # radians by which a vertex must exceed a flat one for paths to 
 GRAZING = 1e-11
 BLUR = 4e-15
 MOST_SLACK = 1e-6
+SHORTER_LEG = 1.0 - 1e-9  # relative margin for "shorter" of last legs: they differ by an edge or more
 SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
 
 
@@ -117,6 +118,20 @@ def bends_paths(v: int, angle_sum: FloatArray, kind: IntArray) -> bool:
     if kind[v] == BOUNDARY_VERTEX:
         return angle_sum[v] > PI + EXCESS
     return kind[v] == BLOCKED_VERTEX or angle_sum[v] > 2.0 * PI + EXCESS
+
+
+@inlined
+def is_better(
+    v: int, distance: float, zx: float, zy: float, sharp: bool, epoch: float, reach: FloatArray, leg: FloatArray
+) -> bool:
+    """Whether a way to v with last leg (zx, zy) replaces the one found so far: it is shorter, or as long with a
+    shorter last leg (see `log_map_kernels.offer`)."""
+    so_far = distance_at(v, epoch, reach)
+    if distance < so_far * SURELY:
+        return True
+    if distance * SURELY > so_far or not sharp:
+        return False
+    return norm(zx, zy) < norm(leg[v, 0], leg[v, 1]) * SHORTER_LEG
 
 
 @kernel
@@ -217,7 +232,7 @@ def propagate(
         apex = tail[to_left]
         distance = sigma + norm(rx, ry)
         sharp = left and right
-        if distance < distance_at(apex, epoch, reach) * (1.0 if sharp else SURELY):
+        if is_better(apex, distance, rx, ry, sharp, epoch, reach, leg):
             cx, cy = -ax / left_length, -ay / left_length
             lower(
                 apex, distance, root, wedge, rx * cos - ry * sin, rx * sin + ry * cos,
@@ -302,7 +317,7 @@ def emit_shadow(
             arrival = backward if reversed_edge else opposite
             neighbour = tail[arrival]
             distance = sigma + (shape[backward, 0] if reversed_edge else shape[h, 0])
-            if distance < distance_at(neighbour, epoch, reach):
+            if is_better(neighbour, distance, x, y, True, epoch, reach, leg):
                 if reversed_edge:
                     bx, by = 1.0, 0.0
                 else:
