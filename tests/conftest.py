@@ -11,7 +11,7 @@ import pytest
 pytest_plugins = ["pytester"]
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-# Bytes of address space a process: what grows without bound fails its own test. Much above what a worker really uses:
+# Bytes of address space a process: what grows without bound fails its own test. Far above what a worker uses, for
 # USD and Blender answer strangely, and without a MemoryError, when an allocation of theirs is refused.
 MOST_MEMORY = 20 * 2**30
 
