@@ -11,9 +11,7 @@ import pytest
 pytest_plugins = ["pytester"]
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-# Bytes of address space a process: what grows without bound fails its own test. Far above what a worker uses, for
-# USD and Blender answer strangely, and without a MemoryError, when an allocation of theirs is refused.
-MOST_MEMORY = 20 * 2**30
+MOST_MEMORY = 8 * 2**30  # bytes of address space a process: what grows without bound fails its own test
 
 
 def pytest_configure() -> None:

@@ -5,11 +5,9 @@ python adapters/usd/generate_schema.py
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import re
-import runpy
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -29,12 +27,9 @@ def generate() -> dict[str, str]:
 
     generator = Path(pxr.__file__).parent / "Usd" / "usdGenSchema.py"
     with tempfile.TemporaryDirectory() as folder:
-        arguments, sys.argv = sys.argv, [str(generator), str(SCHEMA / "schema.usda"), folder]
-        try:
-            with contextlib.redirect_stdout(io.StringIO()):
-                runpy.run_path(str(generator), run_name="__main__")
-        finally:
-            sys.argv = arguments
+        # In a process of its own: it sets variables of the environment that cripple every later USD.
+        command = [sys.executable, str(generator), str(SCHEMA / "schema.usda"), folder]
+        subprocess.run(command, check=True, capture_output=True)
         schema = (Path(folder) / "generatedSchema.usda").read_text(encoding="utf-8")
         plugin = (Path(folder) / "plugInfo.json").read_text(encoding="utf-8")
     for placeholder, value in PLACEHOLDERS.items():
