@@ -154,7 +154,8 @@ def _copy_metadata(source: Sdf.Layer, layer: Sdf.Layer) -> tuple[str, ...]:
     UsdUtils.CopyLayerMetadata(source, layer, skipSublayers=True)
     layer.customLayerData = {**layer.customLayerData, OWNED: LAYOUT}
     notes = []
-    stack = [item for item in Usd.Stage.Open(source).GetLayerStack(includeSessionLayers=False) if item != source]
+    stage = Usd.Stage.Open(source)  # held, for its layers come as weak handles that end with it
+    stack = [item for item in stage.GetLayerStack(includeSessionLayers=False) if item != source]
     for key in (UsdGeom.Tokens.metersPerUnit, UsdGeom.Tokens.upAxis):
         if layer.pseudoRoot.HasInfo(key):
             continue

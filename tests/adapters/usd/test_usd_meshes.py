@@ -173,6 +173,7 @@ def test_units_hold_in_a_root_layer_only_and_are_carried_over(tmp_path: Path) ->
     shot.subLayerPaths = ["asset.usda"]
     shot.Save()
     assert UsdGeom.GetStageMetersPerUnit(Usd.Stage.Open(shot)) == 0.01  # the trap
+    del asset, shot  # from here on nobody but the host holds the layers
     host = UsdHost(tmp_path / "shot.usda")
     assert (host.space().meters_per_unit, host.space().up_axis) == (1.0, "Z")
     assert any("metersPerUnit" in note for note in host.space().notes)
