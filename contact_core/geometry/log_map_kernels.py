@@ -10,6 +10,15 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.queue_kernels import (
+    FREE,
+    HEAP_SIZE,
+    OVERFLOW,
+    POPS,
+    STACK_SIZE,
+    heap_pop,
+    stack_pop,
+)
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -34,12 +43,8 @@ from contact_core.geometry.window_kernels import (
     B1,
     BLUR,
     COS,
-    FREE,
     HALFEDGE,
-    HEAP_SIZE,
     MOST_SLACK,
-    OVERFLOW,
-    POPS,
     ROOT,
     SHORTER_LEG,
     SIGMA,
@@ -53,7 +58,6 @@ from contact_core.geometry.window_kernels import (
     distance_at,
     emit_shadow,
     emit_source,
-    heap_pop,
     lost_its_claim,
     propagate,
 )
@@ -261,6 +265,7 @@ def search(
     """Spread from the sources until every target within `limit` is final; returns (status, blocked element)."""
     state[:] = 0
     state[FREE] = -1
+    keys[len(keys) - 1] = -1.0
     element = list_targets(
         target_faces, target_barycentric, epoch, tail, twin, shape, listed, target_floats, target_integers
     )
@@ -277,11 +282,11 @@ def search(
     patience = max(CHECK_EVERY, len(target_floats))
     bound = farthest_target(limit, epoch, tail, reach, target_floats, target_integers)
     next_check = patience
-    while state[HEAP_SIZE] > 0 and keys[0] <= bound:
+    while state[STACK_SIZE] > 0 or (state[HEAP_SIZE] > 0 and keys[0] <= bound):
         if state[OVERFLOW] > 0:
             return NO_ROOM, 0
-        key = keys[0]
-        item = heap_pop(keys, items, state)
+        key, from_heap = keys[0], state[STACK_SIZE] == 0
+        item = heap_pop(keys, items, state) if from_heap else stack_pop(items, state)
         state[POPS] += 1
         if item < 0:
             v = -1 - item
@@ -296,6 +301,8 @@ def search(
         else:
             if integers[item, HALFEDGE] < 0:
                 return MET_BLOCKED_EDGE, -1 - integers[item, HALFEDGE]
+            if from_heap:
+                keys[len(keys) - 1] = key + shape[integers[item, HALFEDGE], 0]
             if not lost_its_claim(item, epoch, twin, claim, floats, integers):
                 light_targets(item, epoch, shape, listed, floats, integers, target_floats, target_integers)
                 propagate(

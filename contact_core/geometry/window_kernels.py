@@ -19,6 +19,7 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.queue_kernels import FREE, OVERFLOW, USED, WINDOWS, heap_push, stack_push
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -49,10 +50,6 @@ B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING, SLACK = (
 # HALFEDGE.
 HALFEDGE, ROOT, WEDGE, SIDE = constant(0), constant(1), constant(2), constant(3)
 ONLY_CHILD, LEFT_CHILD, RIGHT_CHILD = constant(0), constant(1), constant(2)
-# Entries of state
-HEAP_SIZE, FREE, USED, POPS, WINDOWS, OVERFLOW = (
-    constant(0), constant(1), constant(2), constant(3), constant(4), constant(5),
-)  # fmt: skip
 
 EXCESS = 1e-11  # radians by which a vertex must exceed a flat one for paths to bend round it
 # A ray meets a vertex or a target that it misses by no more than its window's slack, in radians: GRAZING, or what
@@ -63,47 +60,6 @@ BLUR = 4e-15
 MOST_SLACK = 1e-6
 SHORTER_LEG = 1.0 - 1e-9  # relative margin for "shorter" of last legs: they differ by an edge or more
 SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
-
-
-@inlined
-def heap_push(key: float, item: int, keys: FloatArray, items: IntArray, state: IntArray) -> None:
-    """Insert into the min-heap, four children a node; sets OVERFLOW when it is full."""
-    i = state[HEAP_SIZE]
-    if i >= len(keys):
-        state[OVERFLOW] = 1
-        return
-    state[HEAP_SIZE] = i + 1
-    while i > 0:
-        parent = (i - 1) >> 2
-        if keys[parent] <= key:
-            break
-        keys[i], items[i] = keys[parent], items[parent]
-        i = parent
-    keys[i], items[i] = key, item
-
-
-@inlined
-def heap_pop(keys: FloatArray, items: IntArray, state: IntArray) -> int:
-    """Remove the item of the smallest key."""
-    top = items[0]
-    size = state[HEAP_SIZE] - 1
-    state[HEAP_SIZE] = size
-    key, item = keys[size], items[size]
-    i = 0
-    while True:
-        child = 4 * i + 1
-        if child >= size:
-            break
-        least, last = keys[child], min(child + 4, size)
-        for other in range(child + 1, last):
-            if keys[other] < least:
-                child, least = other, keys[other]
-        if least >= key:
-            break
-        keys[i], items[i] = least, items[child]
-        i = child
-    keys[i], items[i] = key, item
-    return top
 
 
 @inlined
@@ -201,7 +157,10 @@ def cast(
     integers[w, HALFEDGE] = h if h != BLOCKED else -1 - edge
     integers[w, ROOT], integers[w, WEDGE], integers[w, SIDE] = root, wedge, side
     state[WINDOWS] += 1
-    heap_push(key, w, keys, items, state)
+    if h == BLOCKED or key > keys[len(keys) - 1]:
+        heap_push(key, w, keys, items, state)
+    else:
+        stack_push(w, items, state)
 
 
 @inlined

@@ -10,7 +10,7 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.mesh import TriangleMesh
 
-_POPS = 3  # window_kernels.POPS; importing that would import numba
+_POPS = 4  # queue_kernels.POPS; importing that would import numba
 
 
 class Workspace:
@@ -23,8 +23,8 @@ class Workspace:
     leg: (n, 3) last leg to the vertex in the root's wedge frame; angle round the vertex of the way back.
     claim: (3m, 5) per entered halfedge: epoch, distance to the apex, where the ray to the apex crosses, interval.
     listed: (m, 2) epoch, first target of the face.
-    floats, integers: window records.  keys, items: heap, four children a node.  state: counters.  All of these as
-    in `window_kernels`.
+    floats, integers: window records, as in `window_kernels`.  keys, items, state: the queue and counters, as in
+    `queue_kernels`.
     """
 
     def __init__(self, point_count: int, face_count: int) -> None:
@@ -34,7 +34,7 @@ class Workspace:
         self.origin: IntArray = np.zeros((point_count, 3), np.int64)
         self.claim: FloatArray = np.zeros((3 * face_count, 5))
         self.listed: FloatArray = np.zeros((face_count, 2))
-        self.state: IntArray = np.zeros(6, np.int64)
+        self.state: IntArray = np.zeros(7, np.int64)
         self.reserve(4096)
 
     def reserve(self, windows: int) -> None:
