@@ -15,6 +15,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -224,17 +225,34 @@ def many_copies(rounds: int, count: int = 64) -> dict[str, Any]:
     shift = (count - 1) * len(work.mesh.faces)
     axis = SurfacePoints(work.axis.faces + shift, work.axis.barycentric)
     points = SurfacePoints(work.points.faces + shift, work.points.barycentric)
-    Topology.of(large)
-    before = resident()
-    log_map(large, axis, points)
-    grown = resident() - before
     times = interleaved({"one": work.parameterize, "64": lambda: log_map(large, axis, points)}, rounds)
-    return {
+    rows: dict[str, Any] = {
         f"W on the last of {count} bunnies ({len(large.faces)} faces): times the cost on one (bar: 1.3)": ratio(
             times["64"], times["one"]
-        ),
-        f"W on the last of {count} bunnies: memory that the first query makes resident, MiB": grown,
+        )
     }
+    fresh = TriangleMesh(work.mesh.points, work.mesh.faces), TriangleMesh(large.points, large.faces)
+    for name, mesh, sources, targets in (
+        ("one bunny", fresh[0], work.axis, work.points),
+        (f"{count} bunnies", fresh[1], axis, points),
+    ):
+        first, later = memory_of_a_query(mesh, sources, targets)
+        rows[f"W on {name}: memory that the first query makes resident, MiB"] = first
+        rows[f"W on {name}: memory that a later query allocates, at most, MiB"] = later
+    return rows
+
+
+def memory_of_a_query(mesh: TriangleMesh, sources: SurfacePoints, targets: SurfacePoints) -> tuple[float, float]:
+    """MiB: pages of the workspace that a first query touches; the peak of what the same query allocates later."""
+    Topology.of(mesh)
+    before = resident()
+    log_map(mesh, sources, targets)
+    grown = resident() - before
+    tracemalloc.start()
+    log_map(mesh, sources, targets)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return grown, peak / 2**20
 
 
 def start_up() -> dict[str, Any]:
