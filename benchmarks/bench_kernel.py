@@ -260,7 +260,7 @@ def start_up() -> dict[str, Any]:
     code = (
         "import time; t = time.perf_counter(); import contact_core.geometry; print(time.perf_counter() - t);"
         "t = time.perf_counter(); import numba; print(time.perf_counter() - t);"
-        "from contact_core.geometry.jit import warm_up; print(warm_up())"
+        "from contact_core.geometry.warm_up import warm_up; print(warm_up())"
     )
 
     def run(cache: str) -> list[float]:

@@ -99,14 +99,3 @@ class _Notice(event.Listener):  # type: ignore[misc]
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, **_accepted({"_nrt": False})}
 _INLINED: dict[str, Any] = _accepted({"forceinline": True})
 event.register("numba:compile", _Notice())
-
-
-def warm_up() -> float:
-    """Compile or load every geodesic kernel ahead of time; returns the seconds that it took."""
-    import time
-
-    from contact_core.geometry import warm_up_calls
-
-    start = time.perf_counter()
-    warm_up_calls.call_every_kernel()
-    return time.perf_counter() - start
