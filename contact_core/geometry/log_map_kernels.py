@@ -302,7 +302,8 @@ def search(
             if integers[item, HALFEDGE] < 0:
                 return MET_BLOCKED_EDGE, -1 - integers[item, HALFEDGE]
             if from_heap:
-                keys[len(keys) - 1] = key + shape[integers[item, HALFEDGE], 0]
+                base = 3 * (integers[item, HALFEDGE] // 3)
+                keys[len(keys) - 1] = key + min(shape[base, 0], shape[base + 1, 0], shape[base + 2, 0])
             if not lost_its_claim(item, epoch, twin, claim, floats, integers):
                 light_targets(item, epoch, shape, listed, floats, integers, target_floats, target_integers)
                 propagate(
