@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 from pose_scenes import LEGS, STAGES, chair, wrap
 
-from contact_builtins.renderers.software import SoftwareRenderer
 from contact_builtins.solvers.stepwise import ProgressiveSolver, StagedSolver
 from contact_core.arrays import FloatArray
 from contact_core.geometry.distance_field import DistanceField
@@ -33,9 +32,11 @@ from contact_core.pose.problem import Limits, PoseProblem
 from contact_core.pose.rig import skin
 from contact_core.pose.solver import PoseSolution, PoseSolver, SolveOptions, patch_residuals, posed_mesh
 from contact_core.pose.terms import DistanceTerm, PriorTerm, paper_terms
+from contact_viewer.renderer import PyVistaRenderer
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SKIN, OBJECT = (0.85, 0.7, 0.6), (0.75, 0.78, 0.85)
+BACKDROP = ("floor", "pole")
 COLORS = {"chair": (0.65, 0.5, 0.35), "floor": (0.8, 0.8, 0.8), "pole": (0.6, 0.6, 0.65)}
 # Weights of distance, normal and prior, and whose limits hold.
 WITHOUT: dict[str, tuple[tuple[float, float, float], Limits]] = {
@@ -238,18 +239,18 @@ def _between(problem: PoseProblem, theta: FloatArray) -> float:
 
 
 def picture(problem: PoseProblem, theta: FloatArray, camera: tuple[float, float, float], caption: str) -> Picture:
-    """All bodies of a problem, posed."""
+    """All bodies of a problem, posed; the long pole and the wide floor may run out of the frame."""
     state = problem.state(theta)
-    meshes = tuple(
-        PictureMesh(posed_mesh(problem, state, body.name), COLORS.get(body.name, OBJECT) if number else SKIN)
-        for number, body in enumerate(problem.bodies)
-    )
-    return Picture(meshes, camera_from=camera, caption=caption)
+    meshes = {body.name: posed_mesh(problem, state, body.name) for body in problem.bodies}
+    colors = [SKIN, *(COLORS.get(body.name, OBJECT) for body in problem.bodies[1:])]
+    focus = np.concatenate([mesh.points for name, mesh in meshes.items() if name not in BACKDROP])
+    drawn = tuple(PictureMesh(mesh, color) for mesh, color in zip(meshes.values(), colors, strict=True))
+    return Picture(drawn, camera_from=camera, caption=caption, focus=focus)
 
 
 def draw(pictures: Sequence[Picture], path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    SoftwareRenderer().render(pictures, path, size=(420 * len(pictures), 420))
+    PyVistaRenderer().render(pictures, path, size=(420 * len(pictures), 420))
 
 
 def main() -> None:

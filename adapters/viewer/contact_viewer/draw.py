@@ -104,7 +104,7 @@ def _light(plotter: Any, pyvista: Any, axes: Any, centre: Any, distance: float) 
 
 def _write(plotter: Any, picture: Picture, pixels: int) -> None:
     """The table from the top left, the caption along the bottom."""
-    size = max(10, pixels // 75)
+    size = max(24, pixels // 75)
     line = size * 1.7
     for place, (name, value, failed) in enumerate(picture.table):
         ink = _ALARM if failed else _INK
