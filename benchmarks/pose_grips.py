@@ -25,8 +25,9 @@ from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Root
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.job.recipe_reader import load_recipe
-from contact_core.job.run import Job, prepare
+from contact_core.job.run import prepare
 from contact_core.job.solving import pose_problem
+from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
 from contact_core.pose.problem import PoseProblem

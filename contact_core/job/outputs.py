@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from contact_core._version import __version__
 from contact_core.document.schema import dump_document
 from contact_core.errors import ContactError
 from contact_core.job.pictures import pictures_of
 from contact_core.job.report import DEFINITIONS, SCHEMA, table
+from contact_core.job.workpiece import Job, JobResult
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS, RENDERERS
 from contact_core.plugins.slots import Picture
 from contact_core.pose.rig import Pose
 from contact_core.whole_file import write_whole
 
-if TYPE_CHECKING:
-    from contact_core.job.run import Job, JobResult
-
 
 def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
     """Draw and write everything. Raises FileRefused where `out` cannot be written."""
-    from contact_core.job.run import JobResult
-
     files: dict[str, Path] = {}
     with job.stage("write", 0.75, "Writing the document, the pose and the model"):
         files["document"] = out / "document.json"

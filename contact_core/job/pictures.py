@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.spatial import cKDTree
 
 from contact_core.arrays import FloatArray
 from contact_core.job.scene import moved, posed_skin
+from contact_core.job.workpiece import Job
 from contact_core.plugins.slots import Picture, PictureMesh
 from contact_core.pose.rig import Pose
-
-if TYPE_CHECKING:
-    from contact_core.job.run import Job
 
 SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 LINES_PER_PATCH = 14

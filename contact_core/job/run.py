@@ -6,20 +6,14 @@ come from the recipe and its placer; a solved pose never places them, unless the
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
-from contact_core.errors import Cancelled, InvalidInput
-from contact_core.geometry.mesh import TriangleMesh
+from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.assets import object_mesh, read_source, solids_of
 from contact_core.job.metrics import Contact, PosedScene, measure
@@ -27,81 +21,18 @@ from contact_core.job.outputs import write_outputs
 from contact_core.job.painting import axis_picks, explicit_root, paint
 from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import load_recipe
-from contact_core.job.report import Verdict, judge
+from contact_core.job.report import judge
 from contact_core.job.scene import away_pose, coarse_pose, posed_skin, posed_world, world_from_object
 from contact_core.job.solving import solve
+from contact_core.job.workpiece import Job, JobProgress, JobResult
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import PLACERS
 from contact_core.plugins.slots import PlacementRequest, PlacementResult
-from contact_core.pose.body import manipulator_length
 from contact_core.pose.bones import bone_segments
-from contact_core.pose.rig import Pose, Rig
-from contact_core.pose.solver import PoseSolution
+from contact_core.pose.rig import Pose
 from contact_core.session import Session
 
-# Called with a fraction 0..1 and a text; False cancels the job.
-JobProgress = Callable[[float, str], bool | None]
-
 HAND, OBJECT = "manipulator", "object"  # names of the two surfaces in the document
-
-
-@dataclass
-class Job:
-    """The workpiece: what the stages of one job know so far."""
-
-    recipe: Recipe
-    session: Session
-    progress: JobProgress | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-
-    manipulator: Asset = field(init=False)
-    object: Asset = field(init=False)  # in the manipulator's units, the recipe's scale applied
-    solids: tuple[TriangleMesh, ...] = field(init=False)
-    placed: FloatArray = field(init=False)  # (4, 4) world_from_object; world is rig space
-    start: Pose = field(init=False)
-    start_distance: float = field(init=False)  # of the open hand to the object, surface units
-    placement: PlacementResult = field(init=False)
-    solution: PoseSolution = field(init=False)
-    pose: Pose = field(init=False)
-    metrics: dict[str, Any] = field(init=False)
-    verdict: Verdict = field(init=False)
-
-    @property
-    def rig(self) -> Rig:
-        assert self.manipulator.rig is not None
-        return self.manipulator.rig
-
-    @cached_property
-    def length(self) -> float:
-        """The manipulator's length: everything is free in a job, so that of the whole skin (surface units)."""
-        return manipulator_length(self.rig)
-
-    @contextmanager
-    def stage(self, name: str, fraction: float, text: str) -> Iterator[None]:
-        """One stage: tell the user, take the time."""
-        self.tell(fraction, text)
-        began = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - began
-
-    def tell(self, fraction: float, text: str) -> None:
-        """Report progress. Raises Cancelled when the user wants to stop."""
-        if self.progress is not None and self.progress(fraction, text) is False:
-            raise Cancelled("the job was cancelled; nothing was written.")
-
-
-@dataclass(frozen=True, eq=False)
-class JobResult:
-    """What a job came to. report: the content of report.json. files: what was written, by role."""
-
-    recipe: Recipe
-    report: Mapping[str, Any]
-    verdict: Verdict
-    files: Mapping[str, Path]
-    table: tuple[tuple[str, str, bool], ...]
 
 
 def run_recipe(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from contact_core.errors import Cancelled, InvalidInput
+from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_TERMS
 from contact_core.plugins.solving import solve_by_plugin
@@ -13,9 +12,6 @@ from contact_core.pose.problem import PoseProblem
 from contact_core.pose.rig import Pose
 from contact_core.pose.solver import Iteration, PoseSolution, SolveOptions, SolveStatus
 from contact_core.pose.terms import PoseTerm, paper_terms
-
-if TYPE_CHECKING:
-    from contact_core.job.run import Job
 
 
 def solve(job: Job, plugins: PluginManager, *, again: bool = False) -> tuple[PoseSolution, Pose]:

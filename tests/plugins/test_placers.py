@@ -19,7 +19,8 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_geodesic
-from contact_core.job.run import Job, perform
+from contact_core.job.run import perform
+from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.pose.rig import Pose, skin

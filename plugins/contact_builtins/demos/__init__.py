@@ -8,7 +8,8 @@ from pathlib import Path
 from contact_core.errors import InvalidInput
 from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import parse_recipe
-from contact_core.job.run import JobProgress, JobResult, run
+from contact_core.job.run import run
+from contact_core.job.workpiece import JobProgress, JobResult
 from contact_core.plugins.manager import PluginManager
 
 DEFAULT = "mug"

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from contact_core.job.recipe_reader import load_recipe
-from contact_core.job.run import Job, perform
+from contact_core.job.run import perform
+from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 
 pytestmark = [pytest.mark.assets, pytest.mark.slow]

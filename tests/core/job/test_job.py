@@ -17,8 +17,9 @@ from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInp
 from contact_core.job.assets import convex_hull
 from contact_core.job.painting import paint
 from contact_core.job.recipe import AssetSource, PatchSpec, PointSpec, Recipe, RootSpec
-from contact_core.job.run import Job, perform, run, target
+from contact_core.job.run import perform, run, target
 from contact_core.job.scene import posed_skin
+from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.slots import Picture
 from contact_core.testing.meshes import icosphere, torus
