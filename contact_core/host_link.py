@@ -28,6 +28,9 @@ class HostLink:
         self._storage = host if isinstance(host, DocumentStorage) else None
         self._undo = host if isinstance(host, Undo) and self._storage is not None else None
         self._stop: Callable[[], None] | None = None
+
+    def listen(self) -> None:
+        """Follow the host's undo from now on, until `close`."""
         if self._undo is not None:
             self._stop = self._undo.on_undo(self.follow)
 

@@ -6,15 +6,17 @@ import contextlib
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.document.document import ContactDocument
-from contact_core.edit.command import Command, Macro, apply_command, register_command
+from contact_core.edit.announcer import Announcer, DocumentChanged, Listener
+from contact_core.edit.command import Command, register_command
 from contact_core.edit.derived import Derived
 from contact_core.edit.history import History, Step
-from contact_core.edit.open_document import OpenDocument
+from contact_core.edit.open_document import OpenDocument, real_path
+from contact_core.edit.open_macro import OpenMacro
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
 from contact_core.errors import CommandRejected, FileRefused
@@ -30,23 +32,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DocumentChanged:
-    """What listeners are told. kind: "preview" comes during a stroke or shows the
-    ghost of a proposal; its revision is that of the start.
-
-    command: the one done, undone or redone; None for a jump or a preview.
-    """
-
-    kind: Literal["do", "undo", "redo", "goto", "preview"]
-    before: ContactDocument
-    after: ContactDocument
-    revision: int
-    command: Command | None
-    origin: str
-
-
-Listener = Callable[[DocumentChanged], None]
+__all__ = ["DocumentChanged", "Session"]
 
 
 class Session(ProposalVerbs):
@@ -55,7 +41,8 @@ class Session(ProposalVerbs):
     document: to start from, empty by default. plugins: modules or objects with hook implementations, of highest
     precedence; discover: whether entry points are read. Use `Session.open` for a document file, and `add_surface`
     for every mesh. Verbs (`paint`, `translate`, `transfer` ...) commit commands; `stroke` gathers a drag into one,
-    `macro` several commands. Use it as a context manager, or call `close`.
+    `macro` several commands. Use it as a context manager, or call `close`. It is for one thread at a time: while
+    one is in an edit, a stroke or a macro, what another thread commits is refused in words.
     """
 
     def __init__(
@@ -70,11 +57,11 @@ class Session(ProposalVerbs):
         self.known_meshes = {}
         self.rigs = {}
         self._derived = Derived(self.known_meshes)
-        self._listeners: list[Listener] = []
+        self._announcer = Announcer()
         self._file: OpenDocument | None = None
-        self._macro: list[Command] | None = None
-        self._macro_document: ContactDocument | None = None
-        self._in_stroke = False
+        self._macro: OpenMacro | None = None
+        self._stroke: Stroke | None = None
+        self._editing = RLock()
         self._plugins: PluginManager | None = None
         self._plugin_arguments = (tuple(plugins), discover)
         self.host = host
@@ -82,9 +69,11 @@ class Session(ProposalVerbs):
         if host is not None:
             from contact_core.host_link import HostLink
 
-            self._host_link = HostLink(self, host)
+            link = HostLink(self, host)
             if document is None:
-                self.history = self._host_link.stored_history() or self.history
+                self.history = link.stored_history() or self.history
+            link.listen()  # last: a session that refuses its document leaves nothing behind in the host
+            self._host_link = link
 
     # -- files ---------------------------------------------------------------------------------------------------
 
@@ -96,9 +85,13 @@ class Session(ProposalVerbs):
         is read-only, and `notes` says who. arguments: as for Session. Raises FileRefused.
         """
         session = cls(**arguments)
-        if journal_path(Path(path)).exists():
-            session.register_commands()  # a journal may hold commands of plugins
-        session._file, session.history = OpenDocument.open(Path(path))
+        try:
+            if journal_path(real_path(Path(path))).exists():
+                session.register_commands()  # a journal may hold commands of plugins
+            session._file, session.history = OpenDocument.open(Path(path))
+        except BaseException:
+            session.close()
+            raise
         return session
 
     @property
@@ -114,34 +107,37 @@ class Session(ProposalVerbs):
     @property
     def read_only(self) -> bool:
         """Whether someone else has the document, so that nothing can be committed here."""
-        return self._file is not None and self._file.read_only
+        return self._file is not None and self._file.read_only is not None
 
     def save(self, path: Path | str | None = None) -> Path:
         """Write the document file, whole or not at all. With a new path the session goes on there.
 
         Raises FileRefused; what was on the disk is untouched then.
         """
-        target = Path(path) if path is not None else self.path
+        target = real_path(Path(path)) if path is not None else self.path
         if target is None:
             raise FileRefused("this document has no file yet: save it with a path.")
-        if self._file is not None and target == self.path and not self.read_only:
-            self._file.save(self.history)
-        else:
-            opened = OpenDocument.create(target, self.history)
-            if self._file is not None:
-                self._file.close(in_order=True)
-            self._file = opened
-        self.history.mark_clean()
+        with self._alone():
+            if self._file is not None and target == self.path and not self.read_only:
+                self._file.save(self.history)
+            else:
+                before, self._file = self._file, OpenDocument.create(target, self.history)
+                if before is not None:
+                    _close_quietly(before)
+            self.history.mark_clean()
         return target
 
     def close(self, *, discard: bool = False) -> None:
         """End in order and let go of lock and host. Edits that were not saved stay in the journal, and the next
-        opening brings them back, unless `discard` says that they are not wanted."""
+        opening brings them back, unless `discard` says that they are not wanted.
+
+        Raises FileRefused where the end could not be recorded; everything is let go of all the same.
+        """
+        link, self._host_link = self._host_link, None
+        if link is not None:
+            link.close()
         if self._file is not None:
             self._file.close(in_order=discard or self.history.is_clean)
-        if self._host_link is not None:
-            self._host_link.close()
-            self._host_link = None
 
     def __enter__(self) -> Session:
         return self
@@ -154,7 +150,7 @@ class Session(ProposalVerbs):
     @property
     def document(self) -> ContactDocument:
         """The document as it is now; within a macro, as the commands so far have made it."""
-        return self._macro_document if self._macro_document is not None else self.history.document
+        return self._macro.document if self._macro is not None else self.history.document
 
     @property
     def derived(self) -> Derived:
@@ -173,20 +169,20 @@ class Session(ProposalVerbs):
         steps cannot be joined: use a stroke there. Raises CommandRejected, or FileRefused when it cannot be
         recorded; then nothing has changed.
         """
-        if self._macro is not None and self._macro_document is not None:
-            self._macro_document = apply_command(command, self._macro_document)
-            self._macro.append(command)
-            return self.revision
-        self._check_writable()
-        host_keeps_steps = self._host_link is not None and self._host_link.has_undo
-        step = self.history.prepare(command, origin, merge=merge and not host_keeps_steps)
-        before = self.history.document
-        with self._in_host(step.command.label(), step.after, step.revision):
-            if self._file is not None:
-                self._file.did(step, merged=step.before is not before)
-            self.history.commit(step)
-        self._tell(DocumentChanged("do", before, step.after, step.revision, step.command, origin))
-        return step.revision
+        with self._alone():
+            self._check_writable()
+            if self._macro is not None:
+                self._macro.do(command)
+                return self.revision
+            host_keeps_steps = self._host_link is not None and self._host_link.has_undo
+            step = self.history.prepare(command, origin, merge=merge and not host_keeps_steps)
+            before = self.history.document
+            with self._in_host(step.command.label(), step.after, step.revision):
+                if self._file is not None:
+                    self._file.did(step)
+                self.history.commit(step)
+            self._tell(DocumentChanged("do", before, step.after, step.revision, step.command, origin))
+            return step.revision
 
     def submit(self, command: Command, *, origin: str = "user") -> int:
         """Commit what a verb made."""
@@ -195,12 +191,14 @@ class Session(ProposalVerbs):
     def undo(self) -> int:
         """Undo one step; answers the revision. With a host that has undo, it is the host's step that is undone."""
         if self._host_link is not None and self._host_link.has_undo:
+            self._check_idle()
             return self._host_link.undo()
         return self._go("undo")
 
     def redo(self) -> int:
         """Redo one step; answers the revision."""
         if self._host_link is not None and self._host_link.has_undo:
+            self._check_idle()
             return self._host_link.redo()
         return self._go("redo")
 
@@ -209,23 +207,24 @@ class Session(ProposalVerbs):
         return self._go("goto", revision, origin)
 
     def _go(self, kind: Literal["undo", "redo", "goto"], revision: int = 0, origin: str = "user") -> int:
-        self._check_writable()
-        if self._macro is not None:
-            raise CommandRejected("a macro is under way: undo comes after its end.")
-        before, came_from = self.history.document, self.revision
-        step: Step | None = None
-        if kind == "goto":
-            self.history.goto(revision)
-        else:
-            step = self.history.undo() if kind == "undo" else self.history.redo()
-        try:
-            self._record_move(origin)
-        except BaseException:
-            self.history.goto(came_from)
-            raise
-        command = step.command if step is not None else None
-        self._tell(DocumentChanged(kind, before, self.history.document, self.revision, command, origin))
-        return self.revision
+        with self._alone():
+            if origin == "host":
+                self._abandon()
+            self._check_idle()
+            before, came_from = self.history.document, self.revision
+            step: Step | None = None
+            if kind == "goto":
+                self.history.goto(revision)
+            else:
+                step = self.history.undo() if kind == "undo" else self.history.redo()
+            try:
+                self._record_move(origin)
+            except BaseException:
+                self.history.goto(came_from)
+                raise
+            command = step.command if step is not None else None
+            self._tell(DocumentChanged(kind, before, self.history.document, self.revision, command, origin))
+            return self.revision
 
     def _record_move(self, origin: str) -> None:
         """Tell host and journal where the history went, the host only when it was not the one who asked."""
@@ -237,51 +236,62 @@ class Session(ProposalVerbs):
 
     def adopt(self, history: History) -> None:
         """Go on with another history: the host brought a document that this one does not know."""
-        before, self.history = self.history.document, history
-        if self._file is not None:
-            self._file.restart(history)
-        self._tell(DocumentChanged("goto", before, history.document, history.revision, None, "host"))
+        with self._alone():
+            self._abandon()
+            before, self.history = self.history.document, history
+            if self._file is not None:
+                self._file.restart(history)
+            self._tell(DocumentChanged("goto", before, history.document, history.revision, None, "host"))
 
     @contextlib.contextmanager
     def macro(self, title: str) -> Iterator[Session]:
-        """Everything done inside is one undo step; an exception takes all of it back."""
-        self._check_writable()
-        if self._macro is not None:  # a macro within a macro is part of it
-            yield self
-            return
-        self._macro, self._macro_document = [], self.history.document
-        try:
-            yield self
-            commands = tuple(self._macro)
-        finally:
-            self._macro = self._macro_document = None
-        if commands:
-            self.do(commands[0] if len(commands) == 1 else Macro(title, commands))
+        """Everything done inside is one undo step; an exception takes all of it back. A macro within a macro is part
+        of it, and an exception takes that part back."""
+        with self._alone():
+            self._check_writable()
+            if self._macro is not None:
+                with self._macro.part():
+                    yield self
+                return
+            macro = self._macro = OpenMacro(title, self.history.document)
+            try:
+                yield self
+            finally:
+                self._macro = None
+            command = macro.end()
+            if command is not None:
+                self.do(command)
 
     @contextlib.contextmanager
     def stroke(self) -> Iterator[Stroke]:
-        """A drag: the verbs of the stroke preview from its start, and the last one is committed at the end."""
-        self._check_writable()
-        start = self.document
-        stroke = Stroke(start, self.revision, self._derived, lambda shown: self._preview(start, shown))
-        self._in_stroke = True
-        try:
-            yield stroke
-        except BaseException:
-            self._in_stroke = False
-            stroke.end()
-            if stroke.command is not None:
-                self._preview(start, start)
-            raise
-        self._in_stroke = False
-        command = stroke.end()
-        if command is not None:
-            self.do(command)
+        """A drag: the verbs of the stroke preview from its start, and the last one is committed at the end.
+
+        What fails, in the drag or in committing it, leaves the document as it was at the start, and listeners see
+        that again.
+        """
+        with self._alone():
+            self._check_writable()
+            start = self.document
+            stroke = Stroke(
+                start, self.revision, self._derived, self.rigs, lambda shown: self._preview(start, shown)
+            )
+            self._stroke = stroke
+            try:
+                yield stroke
+                command, self._stroke = stroke.end(), None
+                if command is not None:
+                    self.do(command)
+            except BaseException:
+                if stroke.command is not None and self.document is start:
+                    self._preview(start, start)
+                raise
+            finally:
+                stroke.end()
+                self._stroke = None
 
     def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` after every change and preview; the returned function stops that."""
-        self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener) if listener in self._listeners else None
+        """Call `listener` after every change and preview, in their order; the returned function stops that."""
+        return self._announcer.listen(listener)
 
     def show_ghost(self, ghost: Proposal | None) -> None:
         """Tell listeners of a preview of what is proposed; None: back to the document."""
@@ -327,11 +337,36 @@ class Session(ProposalVerbs):
 
     # -- inside --------------------------------------------------------------------------------------------------
 
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """The session to this thread alone. Raises CommandRejected where another is in the middle of an edit."""
+        if not self._editing.acquire(blocking=False):
+            raise CommandRejected("another thread is editing this session: a session is for one thread at a time.")
+        try:
+            yield
+        finally:
+            self._editing.release()
+
     def _check_writable(self) -> None:
-        if self.read_only:
-            raise CommandRejected(" ".join(self.notes) or "this session is read-only.")
-        if self._in_stroke:
+        if self._file is not None and self._file.read_only is not None:
+            raise CommandRejected(self._file.read_only)
+        if self._stroke is not None:
             raise CommandRejected("a stroke is under way: end it first.")
+
+    def _check_idle(self) -> None:
+        """The history may move. Raises CommandRejected."""
+        self._check_writable()
+        if self._macro is not None:
+            raise CommandRejected("a macro is under way: undo comes after its end.")
+
+    def _abandon(self) -> None:
+        """The host goes elsewhere in the middle of a stroke or a macro: nothing comes of them."""
+        if self._stroke is not None:
+            self._stroke.abandon()
+            self._stroke = None
+        if self._macro is not None:
+            self._macro.abandon()
+            self._macro = None
 
     def _in_host(self, label: str, document: ContactDocument, revision: int) -> AbstractContextManager[None]:
         if self._host_link is None:
@@ -342,12 +377,12 @@ class Session(ProposalVerbs):
         self._tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))
 
     def _tell(self, change: DocumentChanged) -> None:
-        for listener in tuple(self._listeners):
-            try:
-                listener(change)
-            except Exception:  # a panel that fails to redraw must not take back what is committed
-                log.exception("a listener of the session failed on %s", change.kind)
-        if self._plugins is not None and change.kind != "preview":
-            self._plugins.notify(
-                "contact_document_changed", document=change.after, revision=change.revision, origin=change.origin
-            )
+        self._announcer.tell(change)
+
+
+def _close_quietly(document: OpenDocument) -> None:
+    """Let go of a file whose document lives on elsewhere. A journal that cannot note its end is replayed later."""
+    try:
+        document.close(in_order=True)
+    except FileRefused as error:
+        log.warning("%s was left without an end: %s", document.path, error)

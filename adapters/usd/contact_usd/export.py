@@ -11,8 +11,8 @@ from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.pose.rig import Rig
+from contact_usd.freedoms import FREEDOMS, freedom_to_json
 from contact_usd.mesh import gf_matrix
-from contact_usd.skel import FREEDOMS, freedom_to_json
 
 
 def add_surface(stage: Usd.Stage, asset: Asset, world: FloatArray) -> str:

@@ -31,7 +31,7 @@ from contact_core.pose.rig import Pose
 from contact_core.scene_reading import fit_to_scene, stretch_pose, unstretch_pose
 
 try:
-    from pxr import Sdf, Usd, UsdGeom, UsdSkel
+    from pxr import Sdf, Tf, Usd, UsdGeom, UsdSkel
 except ImportError as error:
     raise MissingExtra("The USD host", "usd") from error
 
@@ -62,7 +62,9 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
             owned = stage_io.open_stage(Path(path))
         self._owned = owned or stage_io.new_stage(space or SceneSpace(1.0, "Y"))
         self._bindings: dict[str, Binding] | None = None
-        self._undo = LayerUndo(self._owned.layer, self._forget)
+        self._undo = LayerUndo(self._owned.layer)
+        # Any layer may change what is bound to what, not only ours: a DCC edits its own at any time.
+        self._key = Tf.Notice.Register(Usd.Notice.ObjectsChanged, self._forget, self._owned.stage)
 
     @classmethod
     def on(cls, stage: Usd.Stage) -> UsdHost:
@@ -136,7 +138,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
 
     def skin_points(self, object_id: str, pose: Pose) -> FloatArray:
         # UsdSkel evaluates a stage of its own on top of ours, so that nothing here is touched.
-        scratch = Usd.Stage.Open(self._scratch_layer())
+        scratch = self._scratch_stage()
         cache, binding = skel.bindings(scratch)[object_id]
         _, parts = skel.read_rig(cache, binding, self.space())
         skeleton = binding.GetSkeleton()
@@ -226,20 +228,21 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
             whole[names.index(name)] = matrix
         return whole
 
-    def _scratch_layer(self) -> Sdf.Layer:
-        """A root of its own over the layers of our stage."""
-        root = self.stage.GetRootLayer()
-        below = [root] if root == self.layer else [self.layer, root]  # the latter on a stage that a DCC has open
+    def _scratch_stage(self) -> Usd.Stage:
+        """A stage of its own over the layers of ours, those of its session among them, as it has them."""
+        session, root = self.stage.GetSessionLayer(), self.stage.GetRootLayer()
         layer = Sdf.Layer.CreateAnonymous()
-        layer.subLayerPaths = [item.identifier for item in below]
-        return layer
+        layer.subLayerPaths = [item.identifier for item in (session, root) if item is not None]
+        scratch = Usd.Stage.Open(layer, self.stage.GetPathResolverContext())
+        scratch.MuteAndUnmuteLayers(self.stage.GetMutedLayers(), [])
+        return scratch
 
     def _rigs(self) -> dict[str, Binding]:
         if self._bindings is None:
             self._bindings = skel.bindings(self.stage)
         return self._bindings
 
-    def _forget(self) -> None:
+    def _forget(self, notice: object, sender: object) -> None:
         self._bindings = None
 
     def _rig(self, object_id: str) -> Binding:

@@ -18,16 +18,16 @@ KEPT_STEPS = 256
 
 
 class LayerUndo:
-    """The undo stack of one layer. `changed` is called after every change of the layer, whoever made it."""
+    """The undo stack of one layer."""
 
-    def __init__(self, layer: Sdf.Layer, changed: Callable[[], None]) -> None:
+    def __init__(self, layer: Sdf.Layer) -> None:
         self._layer = layer
-        self._changed = changed
         self._states = [("open", _copy(layer))]  # the layer after each step
         self._at = 0
         self._depth = 0
         self._touched = False
         self._listeners: list[Callable[[], None]] = []
+        # USD holds the bound method weakly, so a host that nobody holds ends at once, and its layers with it.
         self._key = Tf.Notice.Register(Sdf.Notice.LayersDidChangeSentPerLayer, self._hear, layer)
 
     @contextlib.contextmanager
@@ -85,7 +85,6 @@ class LayerUndo:
 
     def _hear(self, notice: object, sender: object) -> None:
         self._touched = True
-        self._changed()
 
 
 def _copy(layer: Sdf.Layer) -> Sdf.Layer:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom
+from pxr import Gf, Tf, Usd, UsdGeom
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
@@ -13,6 +14,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.placement import Placement, split_world_from_local
 from contact_core.host import SceneSpace
 from contact_core.scene_reading import surface_of_polygons
+from contact_usd.stage_io import reason
 
 AS_IT_STANDS = Usd.TimeCode.EarliestTime()  # a default value, or the first sample where there are only samples
 
@@ -61,20 +63,38 @@ def placement_of(prim: Usd.Prim, frame: float | None = None) -> Placement:
         moved = split_world_from_local(world_of(prim, frame))
     except InvalidInput as error:
         raise InvalidInput(f"{prim.GetPath()}: {error}") from error
+    except Tf.ErrorException as error:
+        raise InvalidInput(f"{prim.GetPath()} has a transform that USD cannot compute: {reason(error)}") from error
     return replace(still, world_from_surface=moved.world_from_surface)
+
+
+def array_of(attribute: Usd.Attribute, shape: tuple[int, ...], dtype: type) -> Any:
+    """The numbers of an attribute as it stands; none where it has none. Raises InvalidInput with its path."""
+    value = attribute.Get(AS_IT_STANDS)
+    try:
+        return np.asarray([] if value is None else value, dtype).reshape(shape)
+    except (TypeError, ValueError) as error:
+        came, wanted = type(value).__name__, attribute.GetTypeName()
+        raise InvalidInput(f"{attribute.GetPath()} holds a {came}, which is no {wanted}.") from error
 
 
 def read_arrays(prim: Usd.Prim) -> MeshArrays:
     """The arrays of a UsdGeomMesh. Raises InvalidInput naming the prim when they do not fit together."""
     mesh = UsdGeom.Mesh(prim)
-    points = np.asarray(mesh.GetPointsAttr().Get(AS_IT_STANDS) or np.zeros((0, 3)), np.float64).reshape(-1, 3)
-    sizes = np.asarray(mesh.GetFaceVertexCountsAttr().Get(AS_IT_STANDS) or [], np.int64)
-    indices = np.asarray(mesh.GetFaceVertexIndicesAttr().Get(AS_IT_STANDS) or [], np.int64)
+    points = array_of(mesh.GetPointsAttr(), (-1, 3), np.float64)
+    sizes = array_of(mesh.GetFaceVertexCountsAttr(), (-1,), np.int64)
+    indices = array_of(mesh.GetFaceVertexIndicesAttr(), (-1,), np.int64)
     if len(points) == 0 or len(sizes) == 0:
         raise InvalidInput(f"{prim.GetPath()} is a mesh without points or faces.")
-    if sizes.sum() != len(indices):
+    if sizes.min() < 0 or sizes.sum() != len(indices):
         raise InvalidInput(
-            f"{prim.GetPath()}: faceVertexCounts add up to {sizes.sum()}, but there are {len(indices)} indices."
+            f"{prim.GetPath()}: faceVertexCounts add up to {sizes.sum()}, the least is {sizes.min()}, but there are"
+            f" {len(indices)} indices."
+        )
+    if indices.size and not 0 <= indices.min() <= indices.max() < len(points):
+        off = indices.min() if indices.min() < 0 else indices.max()
+        raise InvalidInput(
+            f"{prim.GetPath()}: a face names the point {off}, but the points are 0..{len(points) - 1}."
         )
     notes = []
     if mesh.GetPointsAttr().ValueMightBeTimeVarying():
@@ -82,7 +102,7 @@ def read_arrays(prim: Usd.Prim) -> MeshArrays:
     scheme = mesh.GetSubdivisionSchemeAttr().Get()
     if scheme != UsdGeom.Tokens.none:
         notes.append(f"the mesh is a {scheme} cage; patches lie on the cage, not on the smooth surface drawn.")
-    holes = np.asarray(mesh.GetHoleIndicesAttr().Get(AS_IT_STANDS) or [], np.int64)
+    holes = array_of(mesh.GetHoleIndicesAttr(), (-1,), np.int64)
     kept = np.ones(len(sizes), bool)
     kept[holes[(holes >= 0) & (holes < len(sizes))]] = False
     if not kept.all():
@@ -94,14 +114,14 @@ def read_arrays(prim: Usd.Prim) -> MeshArrays:
 
 def read_surface(prim: Usd.Prim, space: SceneSpace) -> Asset:
     """The surface of a mesh prim. Raises InvalidInput."""
-    arrays = read_arrays(prim)
+    arrays, placement = read_arrays(prim), placement_of(prim)
     try:
         asset = surface_of_polygons(
             prim.GetName(),
             arrays.points,
             arrays.face_sizes,
             arrays.face_indices,
-            placement_of(prim),
+            placement,
             space,
             clockwise=arrays.left_handed,
             notes=arrays.notes,
@@ -117,16 +137,19 @@ def selected_points_of(prim: Usd.Prim, subset: str) -> IntArray:
     there = {item.GetPrim().GetName(): item for item in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Mesh(prim))}
     if subset not in there:
         raise InvalidInput(f"{prim.GetPath()} has no GeomSubset {subset!r}; it has {sorted(there)}.")
-    chosen = np.asarray(there[subset].GetIndicesAttr().Get(AS_IT_STANDS) or [], np.int64)
+    chosen = array_of(there[subset].GetIndicesAttr(), (-1,), np.int64)
     kind = there[subset].GetElementTypeAttr().Get()
     if kind == UsdGeom.Tokens.point:
+        count = len(UsdGeom.Mesh(prim).GetPointsAttr().Get(AS_IT_STANDS))
+        if chosen.size and not 0 <= chosen.min() <= chosen.max() < count:
+            raise InvalidInput(f"{prim.GetPath()}: the GeomSubset {subset!r} names points that the mesh has not.")
         return np.unique(chosen)
     if kind != UsdGeom.Tokens.face:
         raise InvalidInput(
             f"{prim.GetPath()}: the GeomSubset {subset!r} selects {kind}s; faces or points were wanted."
         )
-    sizes = np.asarray(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get(AS_IT_STANDS), np.int64)
-    indices = np.asarray(UsdGeom.Mesh(prim).GetFaceVertexIndicesAttr().Get(AS_IT_STANDS), np.int64)
+    sizes = array_of(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr(), (-1,), np.int64)
+    indices = array_of(UsdGeom.Mesh(prim).GetFaceVertexIndicesAttr(), (-1,), np.int64)
     return np.unique(indices[np.repeat(np.isin(np.arange(len(sizes)), chosen), sizes)])
 
 

@@ -19,7 +19,10 @@ ROUNDING = 1e-3  # relative; scales are stored in half precision, which rounds b
 def local_pose(
     cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton, rest: FloatArray, frame: float | None
 ) -> FloatArray:
-    """(j, 4, 4) parent_from_joint at a frame, in skeleton space; None: unkeyed value, first key, or rest."""
+    """(j, 4, 4) parent_from_joint at a frame, in skeleton space; None: unkeyed value, first key, or rest.
+
+    Raises InvalidInput where the animation holds no numbers.
+    """
     query = cache.GetSkelQuery(skeleton)
     animation = query.GetAnimQuery()
     if not animation:
@@ -28,7 +31,12 @@ def local_pose(
     matrices = query.ComputeJointLocalTransforms(time)
     if matrices is None or len(matrices) != len(rest):
         return rest
-    return np.stack([matrix_of(m) for m in matrices])
+    local = np.stack([matrix_of(m) for m in matrices])
+    if not np.isfinite(local).all():
+        raise InvalidInput(
+            f"{animation.GetPrim().GetPath()} holds values that are no numbers, so it gives no pose."
+        )
+    return local
 
 
 def key_frames(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> tuple[float, ...]:

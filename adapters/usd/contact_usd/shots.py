@@ -36,12 +36,25 @@ class Shot:
 
     @classmethod
     def open(cls, path: Path, wanted: Mapping[str, str] | None = None) -> Shot:
-        """A file, with all surfaces of its document found in it. wanted: prim paths by surface, told not found."""
+        """A file, with all surfaces of its document found in it. wanted: prim paths by surface, told not found.
+
+        As a context manager it lets go of the stage at the end, so that the next shot finds files as they are then.
+        """
         host = UsdHost(path)
         shot = cls(host, Session(host=host))
-        for surface in shot.session.document.surfaces.values():
-            shot.bind(surface, wanted or {})
+        try:
+            for surface in shot.session.document.surfaces.values():
+                shot.bind(surface, wanted or {})
+        except BaseException:
+            shot.session.close()
+            raise
         return shot
+
+    def __enter__(self) -> Shot:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.session.close()
 
     def bind(self, surface: Surface, wanted: Mapping[str, str]) -> None:
         """Give the session the mesh behind a surface, where it stands now. Raises InvalidInput."""
@@ -98,10 +111,10 @@ def read_contacts(path: Path) -> ContactDocument:
         if opened.lock is not None:
             opened.lock.release()
         return opened.history.document
-    session = Session(host=UsdHost(path), discover=False)
-    if not session.document.patches:
-        raise FileRefused(f"{path} holds no contacts.")
-    return session.document
+    with Session(host=UsdHost(path), discover=False) as session:
+        if not session.document.patches:
+            raise FileRefused(f"{path} holds no contacts.")
+        return session.document
 
 
 def transfer(
@@ -111,17 +124,17 @@ def transfer(
 
     Surfaces must have the triangles that the contacts were painted on. Raises ContactError.
     """
-    shot = Shot.open(path, wanted)
     with Session(document, discover=False) as source:
         loaded = source.contact_set("contacts", list(document.patches))
-    with shot.host.step("Transfer contacts"):
-        for surface in loaded.surfaces.values():
-            if surface.name not in shot.prims:
-                shot.bind(surface, wanted)
-        names = shot.session.import_set(loaded)
-        shot.publish()
-    shot.host.save(out)
-    return {"patches": list(names.values()), "surfaces": shot.prims}
+    with Shot.open(path, wanted) as shot:
+        with shot.host.step("Transfer contacts"):
+            for surface in loaded.surfaces.values():
+                if surface.name not in shot.prims:
+                    shot.bind(surface, wanted)
+            names = shot.session.import_set(loaded)
+            shot.publish()
+        shot.host.save(out)
+        return {"patches": list(names.values()), "surfaces": shot.prims}
 
 
 def solve(
@@ -136,14 +149,24 @@ def solve(
 
     frames: None for one solve without a key. Each frame starts from the animator's pose, later ones from the last.
     """
-    shot = Shot.open(path, wanted)
-    if not shot.session.document.pairs:
-        raise InvalidInput(f"{path} has no contact pairs, so there is nothing to solve.")
-    times: list[float | None] = list(frames) if frames is not None else [None]
-    problems = ((0.0 if frame is None else frame, _problem(shot, frame)) for frame in times)
-    counter = itertools.count()
-    report = None if tell is None else (lambda seen: tell(0.0, f"{path.name}: iteration {next(counter)}") is False)
-    solved = solve_sequence(solver, problems, progress=report)
+    with Shot.open(path, wanted) as shot:
+        if not shot.session.document.pairs:
+            raise InvalidInput(f"{path} has no contact pairs, so there is nothing to solve.")
+        times: list[float | None] = list(frames) if frames is not None else [None]
+        problems = ((0.0 if frame is None else frame, _problem(shot, frame)) for frame in times)
+        counter = itertools.count()
+        report = (
+            None if tell is None else (lambda seen: tell(0.0, f"{path.name}: iteration {next(counter)}") is False)
+        )
+        solved = solve_sequence(solver, problems, progress=report)
+        if solved.solutions:  # else it was cancelled before the first
+            _write(shot, times, solved)
+            shot.host.save(out)
+        return {"frames": [_frame_facts(frame, k, solved) for k, frame in enumerate(times)]}
+
+
+def _write(shot: Shot, times: Sequence[float | None], solved: SequenceSolution) -> None:
+    """Key what was solved, keep the last pose in the document, and show it: one step."""
     rigs = [name for name in shot.prims if name in shot.session.rigs]
     with shot.host.step("Solve and key"):
         for frame, solution in zip(times, solved.solutions, strict=False):
@@ -154,8 +177,6 @@ def solve(
             if name in solved.solutions[-1].poses:
                 shot.session.set_pose(name, solved.solutions[-1].poses[name])
         shot.publish()
-    shot.host.save(out)
-    return {"frames": [_frame_facts(frame, k, solved) for k, frame in enumerate(times)]}
 
 
 def _problem(shot: Shot, frame: float | None) -> PoseProblem:

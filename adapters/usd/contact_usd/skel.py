@@ -6,7 +6,6 @@ transforms play no part. So rig space is skeleton space with the stretch of the 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -19,12 +18,13 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.triangulate import triangulate
 from contact_core.geometry.weld import weld
 from contact_core.host import SceneSpace
-from contact_core.pose.rig import JointFreedom, Rig
+from contact_core.pose.rig import Rig
 from contact_core.scene_reading import stretch_rig
+from contact_usd.freedoms import read_freedoms
 from contact_usd.mesh import AS_IT_STANDS, matrix_of, placement_of, read_arrays
 
-FREEDOMS = "contact:jointFreedoms"  # JSON: what USD has no word for (limits, hinges), written by our exporter
 INSTANCES = Usd.TraverseInstanceProxies()
+_FLAT = 1e-9  # volume of a unit cube in a joint's axes, made unit: below it the axes are as good as in one plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +80,12 @@ def read_rig(cache: UsdSkel.Cache, binding: UsdSkel.Binding, space: SceneSpace) 
     """The rig as an asset in surface space, and its parts. Raises InvalidInput naming what cannot be reproduced."""
     skeleton = binding.GetSkeleton()
     prim = skeleton.GetPrim()
-    query = cache.GetSkelQuery(skeleton)
-    if not query or not query.GetJointOrder():
-        raise InvalidInput(f"{prim.GetPath()} is a skeleton without joints, or its topology is not valid.")
+    query = _query(cache, skeleton)
     parts = [_read_part(item, query) for item in skinned_meshes(binding)]
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     joints, weights, weight_notes = _influences(parts)
     parents = np.asarray(query.GetTopology().GetParentIndices(), np.int64)
-    bind = np.stack([matrix_of(m) for m in query.GetJointWorldBindTransforms()])
+    bind = _bind_world(query, prim)
     rest, rest_notes = _rest_local(skeleton, parents, bind)
     placement = placement_of(prim)
     try:
@@ -101,7 +99,7 @@ def read_rig(cache: UsdSkel.Cache, binding: UsdSkel.Binding, space: SceneSpace) 
             faces=np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
             skin_joints=joints,
             skin_weights=weights,
-            freedoms=_freedoms(prim, len(parents)),
+            freedoms=read_freedoms(prim, len(parents)),
             meters_per_unit=space.meters_per_unit,
             up_axis=space.up_axis,
         )
@@ -125,8 +123,8 @@ def read_rig(cache: UsdSkel.Cache, binding: UsdSkel.Binding, space: SceneSpace) 
 
 def rest_local(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> FloatArray:
     """(j, 4, 4) parent_from_joint of the rest pose, in skeleton space."""
-    query = cache.GetSkelQuery(skeleton)
-    bind = np.stack([matrix_of(m) for m in query.GetJointWorldBindTransforms()])
+    query = _query(cache, skeleton)
+    bind = _bind_world(query, skeleton.GetPrim())
     return _rest_local(skeleton, np.asarray(query.GetTopology().GetParentIndices(), np.int64), bind)[0]
 
 
@@ -164,6 +162,8 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
         arrays.face_sizes, of_source[arrays.face_indices], arrays.points[first]
     )
     bind = matrix_of(query.GetGeomBindTransform(AS_IT_STANDS))
+    if not np.isfinite(bind).all():
+        raise InvalidInput(f"{path} has a geomBindTransform that is no number.")
     if arrays.left_handed != bool(np.linalg.det(bind[:3, :3]) < 0):
         faces = faces[:, [0, 2, 1]]
     return SkinPart(
@@ -188,12 +188,17 @@ def _varying_influences(
         raise InvalidInput(f"{path}: the joint influences do not fit its {count} points.")
     joints = np.asarray(computed[0], np.int64).reshape(count, -1)
     weights = np.asarray(computed[1], np.float64).reshape(count, -1)
+    if not np.isfinite(weights).all():
+        raise InvalidInput(f"{path} has joint weights that are no numbers.")
     own = query.GetJointOrder()
     if own is not None:
         order = {str(token): k for k, token in enumerate(skeleton.GetJointOrder())}
         lost = [str(token) for token in own if str(token) not in order]
         if lost:
             raise InvalidInput(f"{path} names the joint {lost[0]!r}, which its skeleton does not have.")
+        if not 0 <= joints.min() <= joints.max() < len(own):
+            off = joints.min() if joints.min() < 0 else joints.max()
+            raise InvalidInput(f"{path} names its joint number {off}, but lists {len(own)} joints of its own.")
         joints = np.array([order[str(token)] for token in own])[joints]
     return joints, weights
 
@@ -233,6 +238,34 @@ def _influences(parts: list[SkinPart]) -> tuple[IntArray, FloatArray, tuple[str,
     return joints, weights / total[:, None], tuple(notes)
 
 
+def _query(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> UsdSkel.SkeletonQuery:
+    """Raises InvalidInput where there is no tree of joints to ask about."""
+    query = cache.GetSkelQuery(skeleton)
+    if not query or not query.GetJointOrder():
+        raise InvalidInput(f"{skeleton.GetPath()} is a skeleton without joints, or its topology is not valid.")
+    return query
+
+
+def _bind_world(query: UsdSkel.SkeletonQuery, prim: Usd.Prim) -> FloatArray:
+    """(j, 4, 4) of the joints where the skin is bound. Raises InvalidInput where that is no place for a joint."""
+    joints = [str(token) for token in query.GetJointOrder()]
+    given = query.GetJointWorldBindTransforms()
+    if len(given) != len(joints):
+        raise InvalidInput(
+            f"{prim.GetPath()} has {len(joints)} joints, and its bindTransforms do not fit them: where its skin is"
+            " bound is not said."
+        )
+    bind = np.stack([matrix_of(m) for m in given])
+    axes = np.where(np.isfinite(bind).all(axis=(1, 2), keepdims=True), bind, 0.0)[:, :3, :3]
+    upright = np.abs(np.linalg.det(axes)) > _FLAT * np.linalg.norm(axes, axis=1).prod(axis=1)  # (j,)
+    if not upright.all():
+        raise InvalidInput(
+            f"{prim.GetPath()}: the bindTransform of the joint {joints[int(upright.argmin())]} flattens space, or"
+            " is no number."
+        )
+    return bind
+
+
 def _rest_local(
     skeleton: UsdSkel.Skeleton, parents: IntArray, bind: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...]]:
@@ -242,43 +275,6 @@ def _rest_local(
         return np.stack([matrix_of(m) for m in given]), ()
     above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
     return np.linalg.inv(above) @ bind, ("the skeleton has no rest pose; its bind pose stands in.",)
-
-
-def _freedoms(prim: Usd.Prim, count: int) -> tuple[JointFreedom, ...]:
-    text = prim.GetAttribute(FREEDOMS).Get() if prim.HasAttribute(FREEDOMS) else None
-    if not text:
-        return (JointFreedom(),) * count
-    try:
-        data = json.loads(text)
-        return tuple(freedom_from_json(item) for item in data)
-    except (ValueError, TypeError, KeyError, InvalidInput) as error:
-        raise InvalidInput(f"{FREEDOMS} is damaged: {error}") from error
-
-
-def freedom_from_json(data: dict[str, object]) -> JointFreedom:
-    """A joint's freedom; limits that are null are free."""
-    values = dict(data)
-    for key, free in (("lower", -np.inf), ("upper", np.inf)):
-        values[key] = [free if v is None else v for v in values[key]]  # type: ignore[attr-defined]
-    return JointFreedom(**values)  # type: ignore[arg-type]
-
-
-def freedom_to_json(freedom: JointFreedom) -> dict[str, object]:
-    """JSON has no infinity: a free limit is null."""
-
-    def limits(values: FloatArray | None) -> list[float | None]:
-        return [float(v) if np.isfinite(v) else None for v in (values if values is not None else ())]
-
-    return {
-        "kind": freedom.kind,
-        "order": freedom.order,
-        "translates": freedom.translates,
-        "frame": np.asarray(freedom.frame).tolist(),
-        "lower": limits(freedom.lower),
-        "upper": limits(freedom.upper),
-        "prior_weight": np.asarray(freedom.prior_weight).tolist(),
-        "locked": np.asarray(freedom.locked).tolist(),
-    }
 
 
 def _part_table(parts: list[SkinPart]) -> list[dict[str, object]]:

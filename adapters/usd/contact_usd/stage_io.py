@@ -7,14 +7,17 @@ customLayerData) is opened as a private copy, so an unsaved edit is never seen t
 from __future__ import annotations
 
 import contextlib
+import math
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils
 
-from contact_core.errors import ContactError, FileRefused
+from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.host import SceneSpace
 from contact_core.whole_file import replacing
 
@@ -22,6 +25,7 @@ SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
 WRITABLE = (".usda", ".usdc", ".usd")
 OWNED = "contactOwned"  # key in customLayerData; the number of the layout
 LAYOUT = 1
+TOLD_GAPS = 8  # of what composition did not find, so that a broken shot does not bury all other notes
 
 
 @dataclass(frozen=True)
@@ -36,11 +40,11 @@ class OwnedStage:
 
 
 def new_stage(space: SceneSpace) -> OwnedStage:
-    """An empty stage in memory."""
+    """An empty stage in memory. USD knows no X for up; it becomes Y, to which assets are turned."""
     layer = _owned_layer()
     stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageMetersPerUnit(stage, space.meters_per_unit)
-    UsdGeom.SetStageUpAxis(stage, space.up_axis)
+    UsdGeom.SetStageUpAxis(stage, "Y" if space.up_axis == "X" else space.up_axis)
     stage.SetTimeCodesPerSecond(space.frames_per_second)
     stage.SetFramesPerSecond(space.frames_per_second)
     return OwnedStage(stage, layer, None, ours=False)
@@ -55,36 +59,53 @@ def open_stage(path: Path) -> OwnedStage:
         )
     with refusing(path):
         head = Sdf.Layer.OpenAsAnonymous(str(path), metadataOnly=True)
-        if OWNED in head.customLayerData:
+        if head is not None and OWNED in head.customLayerData:
             return _open_ours(path)
-        source = Sdf.Layer.FindOrOpen(str(path))
+        source = None if head is None else Sdf.Layer.FindOrOpen(str(path))
+        if source is None:
+            raise FileRefused(f"{path} cannot be used as a USD layer: it is empty, or no USD at all.")
         layer = _owned_layer()
-        notes = _copy_metadata(source, layer)
+        UsdUtils.CopyLayerMetadata(source, layer, skipSublayers=True)
+        layer.customLayerData = {**layer.customLayerData, OWNED: LAYOUT}
         layer.subLayerPaths = [str(path)]
-        return OwnedStage(Usd.Stage.Open(layer), layer, path, ours=False, notes=notes)
+        stage = _composed(layer, path)
+        return OwnedStage(stage, layer, path, ours=False, notes=(*_take_units(stage, source), *_gaps(stage)))
 
 
 def on_stage(stage: Usd.Stage) -> OwnedStage:
-    """A stage that a DCC has open: our layer goes under its session layer, stronger than all files."""
+    """A stage that a DCC has open: our layer goes under its session layer, stronger than all files.
+
+    Raises InvalidInput for a stage without a session layer.
+    """
+    if stage.GetSessionLayer() is None:
+        raise InvalidInput(
+            "this stage was opened without a session layer, so there is no place above its files for the contact"
+            " layer; open it with one, which is what Usd.Stage.Open does by itself."
+        )
     layer = _owned_layer()
     stage.GetSessionLayer().subLayerPaths.insert(0, layer.identifier)
     return OwnedStage(stage, layer, None, ours=False)
 
 
 def space_of(stage: Usd.Stage) -> SceneSpace:
-    """Units and axes; frames are the stage's time codes."""
+    """Units and axes; frames are the stage's time codes. What no unit or axis can be becomes USD's fallback."""
     notes = []
-    if stage.GetTimeCodesPerSecond() != stage.GetFramesPerSecond():
+    unit, rate = UsdGeom.GetStageMetersPerUnit(stage), stage.GetTimeCodesPerSecond()
+    up: Literal["Y", "Z"] = "Z" if UsdGeom.GetStageUpAxis(stage) == "Z" else "Y"
+    if not (math.isfinite(unit) and unit > 0.0):
+        notes.append(f"metersPerUnit is {unit:g}, which is no length; USD's fallback of 0.01 is used.")
+        unit = float(UsdGeom.LinearUnits.centimeters)
+    if UsdGeom.GetStageUpAxis(stage) not in ("Y", "Z"):
+        notes.append(f"upAxis is {UsdGeom.GetStageUpAxis(stage)}, which USD does not know; Y is used.")
+    if not (math.isfinite(rate) and rate > 0.0):
+        notes.append(f"timeCodesPerSecond is {rate:g}, which is no rate; USD's fallback of 24 is used.")
+        rate = 24.0
+    elif rate != stage.GetFramesPerSecond():
         notes.append(
-            f"frames are time codes: {stage.GetTimeCodesPerSecond():g} of them are one second,"
+            f"frames are time codes: {rate:g} of them are one second,"
             f" and the stage plays {stage.GetFramesPerSecond():g} frames in it."
         )
-    return SceneSpace(
-        UsdGeom.GetStageMetersPerUnit(stage),
-        str(UsdGeom.GetStageUpAxis(stage)),  # type: ignore[arg-type]
-        stage.GetTimeCodesPerSecond(),
-        tuple(notes),
-    )
+    return SceneSpace(unit, up, rate, tuple(notes))
 
 
 def default_target(owned: OwnedStage) -> Path:
@@ -119,17 +140,17 @@ def refusing(path: Path) -> Iterator[None]:
         yield
     except ContactError:
         raise
-    except (Tf.ErrorException, RuntimeError, AttributeError, UnicodeDecodeError) as error:
-        raise FileRefused(f"{path} cannot be used as a USD layer: {_reason(error)}") from error
+    except (Tf.ErrorException, RuntimeError, UnicodeDecodeError) as error:
+        raise FileRefused(f"{path} cannot be used as a USD layer: {reason(error)}") from error
 
 
-def _reason(error: Exception) -> str:
-    """The last line of USD's message; a damaged file may be quoted in it, bytes and all."""
+def reason(error: Exception) -> str:
+    """What USD says is wrong, without the places in its sources; a damaged file may be quoted, bytes and all."""
     try:
-        lines = str(error).strip().splitlines()
+        said = error.args[0].commentary if isinstance(error, Tf.ErrorException) else str(error)
     except UnicodeDecodeError:
-        lines = []
-    return lines[-1].strip() if lines else "it is damaged."
+        said = ""
+    return " ".join(re.sub(r"matching \S*(?=.* at ')|pxrInternal_\w*::", "", said).split()) or "it is damaged."
 
 
 def _open_ours(path: Path) -> OwnedStage:
@@ -140,7 +161,14 @@ def _open_ours(path: Path) -> OwnedStage:
             f"{path} has contact layout {version}, this release reads {LAYOUT}: install a newer contact-core."
         )
     layer.subLayerPaths = [_absolute(item, path.parent) for item in layer.subLayerPaths]
-    return OwnedStage(Usd.Stage.Open(layer), layer, path, ours=True)
+    below = Path(layer.subLayerPaths[0]) if layer.subLayerPaths else path
+    stage = _composed(layer, below)
+    return OwnedStage(stage, layer, path, ours=True, notes=_gaps(stage))
+
+
+def _composed(layer: Sdf.Layer, source: Path) -> Usd.Stage:
+    """The stage of our layer, which has no folder of its own: search paths start where they do for the source."""
+    return Usd.Stage.Open(layer, Ar.GetResolver().CreateDefaultContextForAsset(str(source)))
 
 
 def _owned_layer() -> Sdf.Layer:
@@ -149,25 +177,31 @@ def _owned_layer() -> Sdf.Layer:
     return layer
 
 
-def _copy_metadata(source: Sdf.Layer, layer: Sdf.Layer) -> tuple[str, ...]:
-    """Units, axes and rates hold only in a root layer: what the source says, else what its sublayers say."""
-    UsdUtils.CopyLayerMetadata(source, layer, skipSublayers=True)
-    layer.customLayerData = {**layer.customLayerData, OWNED: LAYOUT}
+def _take_units(stage: Usd.Stage, source: Sdf.Layer) -> tuple[str, ...]:
+    """Units and axes hold in a root layer only: where the source says none, take over what its sublayers say."""
     notes = []
-    stage = Usd.Stage.Open(source)  # held, for its layers come as weak handles that end with it
-    stack = [item for item in stage.GetLayerStack(includeSessionLayers=False) if item != source]
+    ours = stage.GetRootLayer()
     for key in (UsdGeom.Tokens.metersPerUnit, UsdGeom.Tokens.upAxis):
-        if layer.pseudoRoot.HasInfo(key):
+        tellers = [item for item in stage.GetLayerStack(False) if item.pseudoRoot.HasInfo(key)]
+        if not tellers or tellers[0] in (ours, source):
             continue
-        teller = next((item for item in stack if item.pseudoRoot.HasInfo(key)), None)
-        if teller is not None:
-            value = teller.pseudoRoot.GetInfo(key)
-            layer.pseudoRoot.SetInfo(key, value)
-            notes.append(
-                f"{source.GetDisplayName()} says no {key}, which USD would take for its fallback; its sublayer"
-                f" {teller.GetDisplayName()} says {value}, and that is used."
-            )
+        value = tellers[0].pseudoRoot.GetInfo(key)
+        ours.pseudoRoot.SetInfo(key, value)
+        notes.append(
+            f"{source.GetDisplayName()} says no {key}, which USD would take for its fallback; its sublayer"
+            f" {tellers[0].GetDisplayName()} says {value}, and that is used."
+        )
     return tuple(notes)
+
+
+def _gaps(stage: Usd.Stage) -> tuple[str, ...]:
+    """What the files name and composition did not find or could not use, in USD's words."""
+    if not hasattr(stage, "GetCompositionErrors"):  # before 24.8 or so USD only prints them
+        return ()
+    said = dict.fromkeys(" ".join(str(error).split()) for error in stage.GetCompositionErrors())
+    told = [f"the scene is not whole: {text}" for text in said][:TOLD_GAPS]
+    more = len(said) - len(told)
+    return (*told, *([f"and {more} more such gaps."] if more else []))
 
 
 def _relative(asset: str, folder: Path) -> str:

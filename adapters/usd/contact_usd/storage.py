@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from typing import Any
 
 from pxr import Sdf, Usd
 
@@ -26,18 +27,29 @@ def read(stage: Usd.Stage) -> StoredDocument | None:
     prim = stage.GetPrimAtPath(ROOT)
     if not prim or not prim.GetAttribute("contact:document").HasAuthoredValue():
         return None
-    text, encoding, revision, schema = (prim.GetAttribute(name).Get() for name in _ATTRIBUTES)
+    text, encoding, revision, schema = (_value(prim, name) for name in _ATTRIBUTES)
     try:
         data = base64.b64decode(text, validate=True) if encoding == "base64" else text.encode()
-        return StoredDocument(data, int(revision), int(schema))
-    except (ValueError, TypeError, AttributeError) as error:
+        return StoredDocument(data, revision, schema)
+    except ValueError as error:
         raise FileRefused(f"the contact document on {ROOT} is damaged: {error}") from error
 
 
 def read_schema(stage: Usd.Stage) -> int | None:
-    """The schema number of what the stage holds, without reading it."""
+    """The schema number of what the stage holds, without reading it. Raises FileRefused when it is damaged."""
     attribute = stage.GetAttributeAtPath(ROOT.AppendProperty("contact:schema"))
-    return int(attribute.Get()) if attribute and attribute.HasAuthoredValue() else None
+    there = attribute and attribute.HasAuthoredValue()
+    return int(_value(attribute.GetPrim(), "contact:schema")) if there else None
+
+
+def _value(prim: Usd.Prim, name: str) -> Any:
+    """One attribute of the document, of the type that we write it in. Raises FileRefused."""
+    value, wanted = prim.GetAttribute(name).Get(), _ATTRIBUTES[name]
+    if not isinstance(value, type(wanted.defaultValue)):
+        raise FileRefused(
+            f"the contact document on {ROOT} is damaged: its {name} is no {wanted}, but {value!r:.40}."
+        )
+    return value
 
 
 def write(layer: Sdf.Layer, document: StoredDocument) -> None:
