@@ -58,6 +58,7 @@ class Session(ProposalVerbs):
         self.rigs = {}
         self._derived = Derived(self.known_meshes)
         self._announcer = Announcer()
+        self._announcer.listen(self._tell_plugins)
         self._file: OpenDocument | None = None
         self._macro: OpenMacro | None = None
         self._stroke: Stroke | None = None
@@ -181,7 +182,7 @@ class Session(ProposalVerbs):
                 if self._file is not None:
                     self._file.did(step)
                 self.history.commit(step)
-            self._tell(DocumentChanged("do", before, step.after, step.revision, step.command, origin))
+            self._announcer.tell(DocumentChanged("do", before, step.after, step.revision, step.command, origin))
             return step.revision
 
     def submit(self, command: Command, *, origin: str = "user") -> int:
@@ -223,7 +224,9 @@ class Session(ProposalVerbs):
                 self.history.goto(came_from)
                 raise
             command = step.command if step is not None else None
-            self._tell(DocumentChanged(kind, before, self.history.document, self.revision, command, origin))
+            self._announcer.tell(
+                DocumentChanged(kind, before, self.history.document, self.revision, command, origin)
+            )
             return self.revision
 
     def _record_move(self, origin: str) -> None:
@@ -241,12 +244,12 @@ class Session(ProposalVerbs):
             before, self.history = self.history.document, history
             if self._file is not None:
                 self._file.restart(history)
-            self._tell(DocumentChanged("goto", before, history.document, history.revision, None, "host"))
+            self._announcer.tell(DocumentChanged("goto", before, history.document, history.revision, None, "host"))
 
     @contextlib.contextmanager
     def macro(self, title: str) -> Iterator[Session]:
-        """Everything done inside is one undo step; an exception takes all of it back. A macro within a macro is part
-        of it, and an exception takes that part back."""
+        """Everything done inside is one undo step; an exception takes all of it back. A macro within a macro is
+        part of it, and an exception takes that part back."""
         with self._alone():
             self._check_writable()
             if self._macro is not None:
@@ -374,10 +377,14 @@ class Session(ProposalVerbs):
         return self._host_link.recording(label, document, revision)
 
     def _preview(self, start: ContactDocument, shown: ContactDocument) -> None:
-        self._tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))
+        self._announcer.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))
 
-    def _tell(self, change: DocumentChanged) -> None:
-        self._announcer.tell(change)
+    def _tell_plugins(self, change: DocumentChanged) -> None:
+        """Plugins hear what is committed, from the first commit on, whether or not they were asked for before."""
+        if change.kind != "preview":
+            self.plugins.notify(
+                "contact_document_changed", document=change.after, revision=change.revision, origin=change.origin
+            )
 
 
 def _close_quietly(document: OpenDocument) -> None:

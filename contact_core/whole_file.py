@@ -1,14 +1,30 @@
-"""Files written whole or not at all: a reader never sees half a file, a full disk never eats the old one."""
+"""Files written whole or not at all, and read with a bound: a reader never sees half a file, a full disk never eats
+the old one, a hostile file does not fill the memory."""
 
 from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
+import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
 from contact_core.errors import FileRefused
+
+
+def read_whole(path: Path | str, most: int) -> bytes:
+    """The bytes of a plain file of at most `most` bytes. Raises FileRefused for any other."""
+    try:
+        with open(path, "rb", opener=_without_waiting) as stream:  # the only one with an opener
+            status = os.fstat(stream.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise FileRefused(f"cannot read {path}: it is not a plain file.")
+            if status.st_size > most:
+                raise FileRefused(f"{path} has {status.st_size} bytes; more than {most} are refused.")
+            return stream.read()
+    except OSError as error:
+        raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
 
 
 def write_whole(path: Path | str, data: bytes | str) -> None:
@@ -21,19 +37,20 @@ def write_whole(path: Path | str, data: bytes | str) -> None:
 def replacing(path: Path | str) -> Iterator[Path]:
     """A temporary path beside `path`, of the same suffix; whoever fills it without an error has replaced `path`.
 
-    For libraries that insist on writing files by name. Raises FileRefused when the folder cannot be written.
+    For libraries that insist on writing files by name. A link stays a link, and a file that is replaced keeps its
+    permissions. Raises FileRefused when the folder cannot be written.
     """
     path = Path(path)
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{target.name[:40]}.{secrets.token_hex(6)}{target.suffix}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     except OSError as error:
         raise FileRefused(f"cannot write into {path.parent}: {error.strerror or error}.") from error
-    temporary = Path(name)
     try:
         yield temporary
-        _settle(temporary, path)
+        _settle(temporary, target)
     except OSError as error:
         raise FileRefused(
             f"cannot write {path}: {error.strerror or error}. What was there before is untouched."
@@ -42,11 +59,21 @@ def replacing(path: Path | str) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _settle(temporary: Path, path: Path) -> None:
-    """Bytes to the disk, then the name; mkstemp's private mode becomes what a plain open would have given."""
-    mask = os.umask(0)
-    os.umask(mask)
-    temporary.chmod(0o666 & ~mask)
+def _settle(temporary: Path, target: Path) -> None:
+    """Bytes to the disk, then the name, then the folder that holds the name."""
     with temporary.open("rb+") as stream:
         os.fsync(stream.fileno())
-    temporary.replace(path)
+    if target.is_file():
+        temporary.chmod(stat.S_IMODE(target.stat().st_mode))
+    temporary.replace(target)
+    with contextlib.suppress(OSError):  # not every system opens folders, nor flushes them
+        folder = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Opening a pipe that nobody writes to waits for ever otherwise."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

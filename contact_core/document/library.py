@@ -12,9 +12,9 @@ from contact_core.contact.shape import PatchShape
 from contact_core.document.codec import from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, ContactPair, Patch, Surface
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.document.schema import inconsistencies, open_envelope, parse_json
+from contact_core.document.schema import MAX_BYTES, inconsistencies, open_envelope, parse_json
 from contact_core.errors import FileRefused
-from contact_core.whole_file import write_whole
+from contact_core.whole_file import read_whole, write_whole
 
 SCHEMA = "contact-core.contact-set"
 VERSION = 1
@@ -61,11 +61,8 @@ def save_contact_set(contact_set: ContactSet, path: Path | str) -> None:
 def load_contact_set(path: Path | str) -> ContactSet:
     """Read a set. Raises FileRefused for what is none, is damaged, or is newer than this release."""
     path = Path(path)
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
-    body = open_envelope(parse_json(raw, str(path)), SCHEMA, VERSION, UPGRADES, str(path))
+    data = parse_json(read_whole(path, MAX_BYTES), str(path))
+    body = open_envelope(data, SCHEMA, VERSION, UPGRADES, str(path))
     found: ContactSet = from_json(ContactSet, body, path.name)
     document = ContactDocument(found.surfaces, found.patches, found.shapes, found.pairs, found.groups)
     for problem in inconsistencies(document):

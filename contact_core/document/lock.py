@@ -21,16 +21,18 @@ class DocumentLock:
 
     @classmethod
     def take(cls, document_path: Path) -> DocumentLock | str:
-        """The lock, or a sentence on why there is none: who holds it, or that the folder cannot be written."""
+        """The lock, or why there is none: who holds it, or that the file or its folder cannot be written."""
+        if _is_protected(document_path):
+            return f"{document_path.name} is write-protected"
         path = document_path.with_name(document_path.name + ".lock")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
-            return f"{path.parent} cannot be written ({error.strerror or error}); it is opened read-only here."
+            return f"{path.parent} cannot be written ({error.strerror or error})"
         if not _try_lock(file):
             os.close(file)
-            return f"{document_path.name} is open in {_holder(path)}; it is opened read-only here."
+            return f"{document_path.name} is open in {_holder(path)}"
         os.ftruncate(file, 0)
         os.lseek(file, 0, os.SEEK_SET)
         os.write(file, json.dumps(_myself()).encode())
@@ -42,6 +44,18 @@ class DocumentLock:
             os.ftruncate(self._file, 0)
             os.close(self._file)  # closing releases the lock
             self._file = -1
+
+
+def _is_protected(path: Path) -> bool:
+    """Whether a file is there that may not be written, as version control leaves what is not checked out.
+
+    Renaming another file over it would go through all the same, and so would anything that an administrator does:
+    the permissions themselves are asked.
+    """
+    try:
+        return not path.stat().st_mode & 0o222 or not os.access(path, os.W_OK)
+    except OSError:
+        return False
 
 
 def _myself() -> dict[str, Any]:

@@ -73,10 +73,12 @@ def open_envelope(
     version: int,
     upgrades: dict[int, Callable[[dict[str, Any]], dict[str, Any]]],
     source: str,
+    *,
+    schema_key: str = "schema",
 ) -> dict[str, Any]:
     """The fields of schema-and-version data without those two, brought up to `version`. Raises FileRefused."""
-    if not isinstance(data, dict) or data.get("schema") != schema:
-        found = data.get("schema") if isinstance(data, dict) else type(data).__name__
+    if not isinstance(data, dict) or data.get(schema_key) != schema:
+        found = data.get(schema_key) if isinstance(data, dict) else type(data).__name__
         raise FileRefused(f"{source} is not a {schema} file (its schema is {found!r}).")
     came = data.get("version")
     if not isinstance(came, int) or isinstance(came, bool) or came < 1:
@@ -86,7 +88,7 @@ def open_envelope(
             f"{source} was written as {schema} version {came}, but this release reads up to version {version}:"
             f" install a newer contact-core. The file is left untouched."
         )
-    body = {key: item for key, item in data.items() if key not in ("schema", "version")}
+    body = {key: item for key, item in data.items() if key not in (schema_key, "version")}
     for step in range(came, version):
         body = upgrades[step](body)
     return body

@@ -12,13 +12,17 @@ from contact_core.errors import CommandRejected
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """One committed command. revision: of `after`, never used twice. origin: who did it ("user", "host", ...)."""
+    """One committed command. revision: of `after`, never used twice. origin: who did it ("user", "host", ...).
+
+    merged: it took the place of the step before it, whose command is part of its own.
+    """
 
     revision: int
     command: Command
     before: ContactDocument
     after: ContactDocument
     origin: str
+    merged: bool = False
 
 
 class History:
@@ -85,6 +89,10 @@ class History:
         """Remember the current document as saved."""
         self._clean = self.revision
 
+    def mark_saved(self, revision: int | None) -> None:
+        """Remember the document of a revision as the saved one; None: no revision that undo can reach is."""
+        self._clean = revision
+
     def prepare(self, command: Command, origin: str = "user", *, merge: bool = False) -> Step:
         """The step that `commit` would take; nothing changes yet. Raises CommandRejected.
 
@@ -96,14 +104,14 @@ class History:
         joined = last.command.merge(command) if last and last.origin == origin else None
         if last is None or joined is None:
             return step
-        return Step(step.revision, joined, last.before, after, origin)
+        return Step(step.revision, joined, last.before, after, origin, merged=True)
 
     def commit(self, step: Step) -> Step:
         """Take a prepared step: undone steps are dropped, a merged step takes the place of the last."""
-        merged = self._cursor > 0 and step.before is not self.document
-        if merged and step.before is not self._steps[self._cursor - 1].before:
+        follows = self._steps[self._cursor - 1].before if step.merged and self._cursor else self.document
+        if step.before is not follows or step.revision <= self._last_revision:
             raise CommandRejected("this step was prepared on another document.")
-        self._cursor -= merged
+        self._cursor -= step.merged
         del self._steps[self._cursor :]
         self._steps.append(step)
         self._cursor += 1

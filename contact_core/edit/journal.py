@@ -1,7 +1,7 @@
 """The journal: an append-only file beside an open document, one line for each committed event.
 
 A line is a CRC-32 in eight hex digits, a blank, compact JSON, a newline. The first line holds the whole document
-that the session started from, so a journal alone replays to everything that was acknowledged. An event is
+that the history started from, so a journal alone replays to everything that was acknowledged. An event is
 acknowledged when the operating system has it (killing the process loses nothing); a thread flushes it to the
 disk within FLUSH_SECONDS, which is the window that a power cut can lose.
 """
@@ -12,22 +12,24 @@ import json
 import os
 import threading
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from contact_core.document.document import ContactDocument
-from contact_core.document.schema import document_from_json, document_to_json
+from contact_core.document.schema import document_from_json, document_to_json, open_envelope
 from contact_core.edit.command import command_from_json, command_to_json
 from contact_core.edit.history import History, Step
 from contact_core.errors import ContactError, FileRefused
-from contact_core.whole_file import write_whole
+from contact_core.whole_file import read_whole, write_whole
 
 SCHEMA = "contact-core.journal"
 VERSION = 1
 FLUSH_SECONDS = 0.1
 MAX_BYTES = 4 << 30
+
+UPGRADES: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}  # of the first line, by version
 
 
 class Journal:
@@ -35,7 +37,10 @@ class Journal:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
+        try:
+            self._file = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
+        except OSError as error:
+            raise FileRefused(f"the journal {path} cannot be written: {error.strerror or error}.") from error
         self._length = os.lseek(self._file, 0, os.SEEK_END)
         self._broken: str | None = None
         self._lock = threading.Lock()
@@ -45,27 +50,29 @@ class Journal:
 
     @classmethod
     def start(cls, path: Path, history: History, file_digest: str | None) -> Journal:
-        """A new journal from the current document of `history`, written whole and flushed. Raises FileRefused.
+        """A new journal of a history, its steps so far included, written whole and flushed. Raises FileRefused.
 
         file_digest: of the document file as it lies on the disk, None where there is none yet.
         """
         header = {
             "journal": SCHEMA,
             "version": VERSION,
-            "revision": history.revision,
+            "revision": history.base_revision,
             "file": file_digest,
-            "document": document_to_json(history.document),
+            "document": document_to_json(history.base),
         }
-        write_whole(path, encode_line(header))
+        events = [_event_of(step) for step in history.steps]
+        if history.can_redo:
+            events.append({"goto": history.revision})
+        write_whole(path, b"".join(map(encode_line, [header, *events])))
         return cls(path)
 
-    def did(self, step: Step, *, merged: bool = False) -> None:
-        """Record a step about to be committed. `merged`: it takes the place of the step before it.
+    def did(self, step: Step) -> None:
+        """Record a step about to be committed.
 
         Raises FileRefused when it cannot be written; then the journal is as it was, and the step must not be.
         """
-        event = {"at": step.revision, "do": command_to_json(step.command), "origin": step.origin}
-        self._append(event | {"merged": True} if merged else event)
+        self._append(_event_of(step) | ({"merged": True} if step.merged else {}))
 
     def went(self, revision: int) -> None:
         """Record an undo, a redo or a jump. Raises FileRefused."""
@@ -76,19 +83,29 @@ class Journal:
         self._append({"saved": revision, "file": file_digest})
 
     def flush(self) -> None:
-        """To the disk, now."""
+        """To the disk, now; edits go on being recorded meanwhile. Raises OSError."""
         with self._lock:
-            if self._file >= 0:
-                os.fsync(self._file)
+            if self._file < 0:
+                return
+            file = os.dup(self._file)
+        try:
+            os.fsync(file)
+        finally:
+            os.close(file)
 
     def close(self, *, record: bool = True) -> None:
-        """Flush and close. `record`: this is an orderly end, so the next opening does not replay the journal."""
+        """Flush and close. `record`: this is an orderly end, so the next opening does not replay the journal.
+
+        Raises FileRefused where that could not be written; it is closed all the same.
+        """
         if self._file < 0:
             return
         try:
             if record and self._broken is None:
                 self._append({"closed": True})
             self.flush()
+        except OSError as error:
+            raise FileRefused(f"the disk under {self.path} reports {error.strerror or error}.") from error
         finally:
             self._closing.set()
             self._dirty.set()
@@ -159,9 +176,10 @@ class JournalContents:
         return bool(self.events) and "closed" in self.events[-1]
 
     @property
-    def file_digests(self) -> frozenset[str | None]:
-        """Digests of the document file that this journal knows."""
-        return frozenset([self.file_digest, *(event["file"] for event in self.events if "saved" in event)])
+    def saved_revisions(self) -> dict[str, int]:
+        """Which revision the document file held, by the digest of the file."""
+        saved = [event for event in self.events if "saved" in event]
+        return {event["file"]: event["saved"] for event in saved if isinstance(event.get("file"), str)}
 
     @property
     def edits(self) -> int:
@@ -171,14 +189,8 @@ class JournalContents:
 
 def read_journal(path: Path) -> JournalContents:
     """The sound part of a journal. Raises FileRefused when not even the first line is."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise FileRefused(f"{path} is larger than {MAX_BYTES} bytes; that is no journal.")
-        raw = path.read_bytes()
-    except OSError as error:
-        raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
     good, damage, records = 0, None, []
-    for number, line in enumerate(_lines(raw), start=1):
+    for number, line in enumerate(_lines(read_whole(path, MAX_BYTES)), start=1):
         event = decode_line(line)
         if event is None:
             damage = f"line {number} of {path.name} is damaged or was cut off; all before it is whole."
@@ -188,15 +200,12 @@ def read_journal(path: Path) -> JournalContents:
     if not records:
         raise FileRefused(f"{path} is damaged from its first line on; nothing can be recovered from it.")
     header = records[0]
-    if header.get("journal") != SCHEMA or not isinstance(header.get("version"), int):
-        raise FileRefused(f"{path} is not a {SCHEMA} file.")
-    if header["version"] > VERSION:
-        raise FileRefused(
-            f"{path} was written as {SCHEMA} version {header['version']}; this release reads up to {VERSION}:"
-            " install a newer contact-core. The file is left untouched."
-        )
-    base = document_from_json(header.get("document"), f"the document in {path.name}")
-    return JournalContents(base, int(header["revision"]), header.get("file"), tuple(records[1:]), good, damage)
+    body = open_envelope(header, SCHEMA, VERSION, UPGRADES, str(path), schema_key="journal")
+    base = document_from_json(body.get("document"), f"the document in {path.name}")
+    revision, digest = _whole_number(body, "revision"), body.get("file")
+    if not (digest is None or isinstance(digest, str)):
+        raise FileRefused(f"{path} names no document file that could be ({str(digest)[:60]!r}).")
+    return JournalContents(base, revision, digest, tuple(records[1:]), good, damage)
 
 
 def replay(contents: JournalContents) -> tuple[History, str | None]:
@@ -205,7 +214,7 @@ def replay(contents: JournalContents) -> tuple[History, str | None]:
     for number, event in enumerate(contents.events, start=2):
         try:
             _replay_event(history, event)
-        except (ContactError, KeyError, TypeError) as error:
+        except ContactError as error:
             return history, f"the event on line {number} cannot be replayed: {error}"
     return history, None
 
@@ -223,8 +232,15 @@ def decode_line(line: bytes) -> dict[str, Any] | None:
     body = line[9:-1]
     if b"%08x" % zlib.crc32(body) != line[:8]:
         return None
-    event = json.loads(body)
+    try:
+        event = json.loads(body)
+    except (ValueError, RecursionError):  # whole, but nothing that this journal would write
+        return None
     return event if isinstance(event, dict) else None
+
+
+def _event_of(step: Step) -> dict[str, Any]:
+    return {"at": step.revision, "do": command_to_json(step.command), "origin": step.origin}
 
 
 def _replay_event(history: History, event: dict[str, Any]) -> None:
@@ -232,11 +248,18 @@ def _replay_event(history: History, event: dict[str, Any]) -> None:
         command = command_from_json(event["do"])
         if event.get("merged"):
             history.undo()  # the recorded command is the merged one: it takes the place of the last step
-        history.do_as(command, str(event["origin"]), int(event["at"]))
+        history.do_as(command, str(event.get("origin")), _whole_number(event, "at"))
     elif "goto" in event:
-        history.goto(int(event["goto"]))
-    elif "saved" in event:
-        history.mark_clean()
+        history.goto(_whole_number(event, "goto"))
+    elif "saved" in event and not (isinstance(event.get("file"), str) and _whole_number(event, "saved") >= 0):
+        raise FileRefused("it names no document file.")
+
+
+def _whole_number(event: Mapping[str, Any], key: str) -> int:
+    number = event.get(key)
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 1 << 63:
+        raise FileRefused(f"its {key!r} is a whole number, but {str(number)[:60]} came.")
+    return number
 
 
 def _lines(raw: bytes) -> Iterator[bytes]:

@@ -2,57 +2,70 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from contact_core.document.lock import DocumentLock
 from contact_core.edit.history import History, Step
 from contact_core.edit.journal import Journal
-from contact_core.edit.recovery import journal_path, open_file, write_document
+from contact_core.edit.recovery import digest_of, journal_path, open_file, set_aside, write_document
 from contact_core.errors import FileRefused
 
 
 class OpenDocument:
     """The file side of a session.
 
-    notes: sentences for the artist on what opening found. read_only: someone else has the document.
+    path: absolute, links followed, so that no other spelling and no other working directory means another file.
+    notes: sentences for the artist on what opening found. read_only: why nothing may be written here, None where
+    it may.
     """
 
     def __init__(
-        self, path: Path, journal: Journal | None, lock: DocumentLock | None, notes: tuple[str, ...]
+        self,
+        path: Path,
+        journal: Journal | None,
+        lock: DocumentLock | None,
+        notes: tuple[str, ...] = (),
+        read_only: str | None = None,
     ) -> None:
         self.path = path
         self.notes = notes
+        self.read_only = read_only
         self._journal = journal
         self._lock = lock
 
     @classmethod
     def open(cls, path: Path) -> tuple[OpenDocument, History]:
         """Open a path, replaying an interrupted journal. Raises FileRefused."""
-        opened = open_file(path)
-        return cls(path, opened.journal, opened.lock, opened.notes), opened.history
+        opened = open_file(real_path(path))
+        document = cls(opened.path, opened.journal, opened.lock, opened.notes, opened.read_only)
+        return document, opened.history
 
     @classmethod
     def create(cls, path: Path, history: History) -> OpenDocument:
-        """Write the document to a path that nobody else has open, and start a journal there. Raises FileRefused."""
+        """Write the document to a path that nobody else has open, and start a journal there. Raises FileRefused.
+
+        A journal that is there already, of an interrupted session, is kept under another name.
+        """
+        path = real_path(path)
         lock = DocumentLock.take(path)
         if isinstance(lock, str):
-            raise FileRefused(f"cannot save there: {lock}")
+            raise FileRefused(f"cannot save there: {lock}.")
         try:
+            kept = set_aside(path)
+            notes = () if kept is None else (f"a journal of {path.name} with edits is kept as {kept}.",)
             digest = write_document(path, history.document)
-            return cls(path, Journal.start(journal_path(path), history, digest), lock, ())
+            journal = Journal.start(journal_path(path), history, digest)
+            journal.saved(history.revision, digest)
+            return cls(path, journal, lock, notes)
         except BaseException:
             lock.release()
             raise
 
-    @property
-    def read_only(self) -> bool:
-        """Whether nothing may be written here."""
-        return self._lock is None
-
-    def did(self, step: Step, *, merged: bool) -> None:
+    def did(self, step: Step) -> None:
         """Record a step about to be committed. Raises FileRefused; then it must not be."""
         if self._journal is not None:
-            self._journal.did(step, merged=merged)
+            self._journal.did(step)
 
     def went(self, revision: int) -> None:
         """Record where the history went. Raises FileRefused."""
@@ -66,16 +79,27 @@ class OpenDocument:
             self._journal.saved(history.revision, digest)
 
     def restart(self, history: History) -> None:
-        """Begin the journal anew with a history that did not come out of it."""
+        """Begin the journal anew with a history that did not come out of it. Raises FileRefused."""
         if self._journal is not None:
-            self._journal.close(record=False)
-            self._journal = Journal.start(journal_path(self.path), history, None)
+            self._journal.close()
+            set_aside(self.path)
+            self._journal = Journal.start(journal_path(self.path), history, digest_of(self.path))
 
     def close(self, *, in_order: bool) -> None:
-        """Let go. in_order: the journal is done with; otherwise the next opening replays it."""
-        if self._journal is not None:
-            self._journal.close(record=in_order)
-            self._journal = None
-        if self._lock is not None:
-            self._lock.release()
-            self._lock = None
+        """Let go. in_order: the journal is done with; otherwise the next opening replays it.
+
+        Raises FileRefused where the end could not be recorded; it is let go of all the same.
+        """
+        journal, lock, self._journal, self._lock = self._journal, self._lock, None, None
+        self.read_only = f"{self.path.name} is closed."
+        try:
+            if journal is not None:
+                journal.close(record=in_order)
+        finally:
+            if lock is not None:
+                lock.release()
+
+
+def real_path(path: Path) -> Path:
+    """The file that a path means: absolute, links followed."""
+    return Path(os.path.realpath(path))

@@ -9,22 +9,26 @@ from pathlib import Path
 
 from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
-from contact_core.document.schema import dump_document, parse_document, same_documents
+from contact_core.document.schema import MAX_BYTES, dump_document, parse_document, same_documents
 from contact_core.edit.history import History
 from contact_core.edit.journal import Journal, JournalContents, read_journal, replay
 from contact_core.errors import FileRefused
-from contact_core.whole_file import write_whole
+from contact_core.whole_file import read_whole, write_whole
 
 
 @dataclass(frozen=True, eq=False)
 class OpenedFile:
-    """What opening a path gave. journal and lock are None when read-only. notes: sentences for the artist."""
+    """What opening a path gave. journal and lock are None when read-only. notes: sentences for the artist.
+
+    read_only: why nothing can be written, None where it can.
+    """
 
     path: Path
     history: History
     journal: Journal | None
     lock: DocumentLock | None
     notes: tuple[str, ...]
+    read_only: str | None = None
 
 
 def journal_path(path: Path) -> Path:
@@ -34,10 +38,7 @@ def journal_path(path: Path) -> Path:
 
 def read_document(path: Path) -> tuple[ContactDocument, str]:
     """The document in a file and the digest of the file. Raises FileRefused."""
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
+    raw = read_whole(path, MAX_BYTES)
     return parse_document(raw, str(path)), file_digest(raw)
 
 
@@ -53,6 +54,11 @@ def file_digest(raw: bytes) -> str:
     return hashlib.sha256(raw).hexdigest()
 
 
+def digest_of(path: Path) -> str | None:
+    """Digest of the document file at a path, None without one. Raises FileRefused."""
+    return file_digest(read_whole(path, MAX_BYTES)) if path.exists() else None
+
+
 def open_file(path: Path) -> OpenedFile:
     """Open a document for writing, or read-only where someone else has it. A path without a file is a new document.
 
@@ -60,8 +66,8 @@ def open_file(path: Path) -> OpenedFile:
     """
     lock = DocumentLock.take(path)
     if isinstance(lock, str):
-        document, _ = read_document(path)
-        return OpenedFile(path, History(document), None, None, (lock,))
+        reason = f"{lock}; it is opened read-only here."
+        return OpenedFile(path, History(read_only_document(path)), None, None, (reason,), reason)
     try:
         return _open_locked(path, lock)
     except BaseException:
@@ -69,29 +75,59 @@ def open_file(path: Path) -> OpenedFile:
         raise
 
 
+def read_only_document(path: Path) -> ContactDocument:
+    """The document at a path as last saved, nothing locked and nothing written; before its first save, as the
+    journal beside it has it. Raises FileRefused."""
+    beside = journal_path(path)
+    if not path.exists() and beside.exists():
+        return replay(read_journal(beside))[0].document
+    return read_document(path)[0]
+
+
+def set_aside(path: Path) -> str | None:
+    """Move the journal of a document out of the way of a new one; answers the name that one keeps which was not
+    closed in order."""
+    beside = journal_path(path)
+    old, _ = _read_old_journal(beside)
+    if old is not None and not old.closed and old.edits:
+        return _keep(beside, "unused").name
+    if old is not None:
+        beside.replace(beside.with_name(beside.name + ".previous"))
+    return None
+
+
 def _open_locked(path: Path, lock: DocumentLock) -> OpenedFile:
     beside = journal_path(path)
     old, notes = _read_old_journal(beside)
+    document, digest = ContactDocument(), None
     try:
-        document, digest = read_document(path) if path.exists() else (ContactDocument(), None)
+        if path.exists():
+            document, digest = read_document(path)
     except FileRefused as error:
         if old is None or "newer contact-core" in str(error):
             raise
-        kept = _keep(path, "damaged")
-        notes.append(f"{error} It is kept as {kept.name}; the journal holds the document.")
-        document, digest = old.base, old.file_digest
-    if old is not None and not old.closed and digest in old.file_digests:
-        return _resume(path, lock, beside, old, document, notes)
-    if old is not None and not old.closed and old.edits:
-        kept = _keep(beside, "unused")
+        notes.append(f"{error} It is kept as {_keep(path, 'damaged').name}; the journal holds the document.")
+        return _resume(path, lock, old, None, None, notes)
+    if old is not None and not old.closed and _belongs(old, document, digest):
+        return _resume(path, lock, old, document, digest, notes)
+    kept = set_aside(path) if old is not None else None
+    if kept is not None:
         notes.append(
             f"{path.name} was changed by something else since its journal was written; the journal is kept as"
-            f" {kept.name} (contact replay reads it)."
+            f" {kept} (contact replay reads it)."
         )
-    elif old is not None:
-        beside.replace(beside.with_name(beside.name + ".previous"))
     history = History(document)
     return OpenedFile(path, history, Journal.start(beside, history, digest), lock, tuple(notes))
+
+
+def _belongs(old: JournalContents, document: ContactDocument, digest: str | None) -> bool:
+    """Whether a journal speaks of this document file: it names it, or leads to what it holds (the session ended
+    between writing the file and saying so)."""
+    return _names(old, digest) or same_documents(replay(old)[0].document, document)
+
+
+def _names(old: JournalContents, digest: str | None) -> bool:
+    return digest == old.file_digest or digest in old.saved_revisions
 
 
 def _read_old_journal(beside: Path) -> tuple[JournalContents | None, list[str]]:
@@ -106,25 +142,43 @@ def _read_old_journal(beside: Path) -> tuple[JournalContents | None, list[str]]:
 
 
 def _resume(
-    path: Path, lock: DocumentLock, beside: Path, old: JournalContents, document: ContactDocument, notes: list[str]
+    path: Path,
+    lock: DocumentLock,
+    old: JournalContents,
+    document: ContactDocument | None,
+    digest: str | None,
+    notes: list[str],
 ) -> OpenedFile:
-    """Go on with the journal of a session that was interrupted."""
+    """Go on with the journal of a session that was interrupted. document, digest: of the file, None without one."""
+    beside = journal_path(path)
     history, trouble = replay(old)
+    history.mark_saved(_saved_revision(old, history, document, digest))
     if old.damage or trouble:
         kept = _keep(beside, "damaged", copy=True)
         notes.append(f"{old.damage or trouble} The whole journal is kept as {kept.name}.")
-    if trouble:  # go on from what was replayed, in a new journal
-        journal = Journal.start(beside, history, old.file_digest)
-    else:
-        if old.damage:
-            write_whole(beside, beside.read_bytes()[: old.good_bytes])
+    sound = not (old.damage or trouble or old.closed)
+    if sound and document is not None and _names(old, digest):
         journal = Journal(beside)
-    if not same_documents(history.document, document):
+    else:  # whole, of what was replayed, and naming the file as it is now
+        journal = Journal.start(beside, history, digest)
+    if document is None or not same_documents(history.document, document):
         steps = len(history.done)
         notes.append(
             f"{path.name} was not closed in order: {steps} committed steps were recovered from its journal."
         )
     return OpenedFile(path, history, journal, lock, tuple(notes))
+
+
+def _saved_revision(
+    old: JournalContents, history: History, document: ContactDocument | None, digest: str | None
+) -> int | None:
+    """The revision that the document file holds, None where it holds none of this history."""
+    if document is None:
+        return None
+    for revision in (history.revision, history.base_revision):
+        if same_documents(history.document_at(revision), document):
+            return revision
+    return old.saved_revisions.get(digest or "")
 
 
 def _keep(path: Path, why: str, *, copy: bool = False) -> Path:

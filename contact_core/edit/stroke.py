@@ -9,6 +9,7 @@ from contact_core.edit.command import Command, apply_command
 from contact_core.edit.derived import Derived
 from contact_core.edit.verbs import Verbs
 from contact_core.errors import CommandRejected
+from contact_core.pose.rig import Rig
 
 
 class Stroke(Verbs):
@@ -19,8 +20,14 @@ class Stroke(Verbs):
     """
 
     def __init__(
-        self, start: ContactDocument, revision: int, derived: Derived, preview: Callable[[ContactDocument], None]
+        self,
+        start: ContactDocument,
+        revision: int,
+        derived: Derived,
+        rigs: dict[str, Rig],
+        preview: Callable[[ContactDocument], None],
     ) -> None:
+        self.rigs = rigs
         self._start = start
         self._revision = revision
         self._derived = derived
@@ -62,6 +69,10 @@ class Stroke(Verbs):
         """Back to the start; nothing will be committed unless another verb comes."""
         self._command, self._shown = None, self._start
         self._preview(self._start)
+
+    def abandon(self) -> None:
+        """End it with nothing to commit, nor to show."""
+        self._command, self._shown, self._open = None, self._start, False
 
     def end(self) -> Command | None:
         """Close the stroke; answers what is to be committed."""

@@ -19,6 +19,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
+from contact_core.pose.rig import Rig, forward_kinematics, skin
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +38,21 @@ class _Frame:
 
 
 class GatheringVerbs(PaintingVerbs):
-    """Contacts from proximity, and transfer of groups."""
+    """Contacts from proximity, and transfer of groups. rigs: by surface."""
+
+    rigs: dict[str, Rig]
 
     def posed_mesh(self, surface: str) -> TriangleMesh:
-        """The surface as it stands in its pose; a session poses rigs, without one it is the mesh itself."""
-        return self.mesh(surface)
+        """The surface in the pose that the document holds; at rest without one."""
+        pose, rig = self.document.poses.get(surface), self.rigs.get(surface)
+        if pose is None:
+            return self.mesh(surface)
+        if rig is None:
+            raise InvalidInput(f"the rig of {surface!r} is not loaded: give it to the session by add_surface.")
+        local = rig.rest_local.copy()
+        for joint, matrix in zip(pose.joints, pose.local, strict=True):
+            local[rig.joint_index(joint)] = matrix
+        return self.mesh(surface).with_points(skin(rig, forward_kinematics(rig.parents, local)))
 
     def touching(
         self, surface: str, other: str, distance: float, *, facing: bool = True, smallest: int = 3

@@ -17,7 +17,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.pose.bones import bones_of
-from contact_core.pose.rig import Rig, forward_kinematics, skin
+from contact_core.pose.rig import Rig
 
 
 class SurfaceVerbs(Editor):
@@ -67,13 +67,13 @@ class SurfaceVerbs(Editor):
                 f"{name!r} is another mesh now ({known.points} points and {known.faces} faces before,"
                 f" {wanted.points} and {wanted.faces} now): use rebind to project its contacts onto the new one."
             )
+        self.known_meshes[mesh.digest] = mesh  # before the command: who is told of it may ask for the mesh
+        if rig is not None:
+            self.rigs[name] = rig
         if known is None:
             self.submit(AddSurface(wanted), origin="asset")
         elif known.digest != wanted.digest:
             self.submit(RebindSurface(replace(known, digest=wanted.digest), FrozenMap(), ()), origin="asset")
-        self.known_meshes[mesh.digest] = mesh
-        if rig is not None:
-            self.rigs[name] = rig
         return self.document.surface(name)
 
     def rebind(self, name: str, mesh: TriangleMesh, *, old_mesh: TriangleMesh | None = None) -> RebindReport:
@@ -97,18 +97,6 @@ class SurfaceVerbs(Editor):
         self.known_meshes[mesh.digest] = mesh
         self.submit(command)
         return report
-
-    def posed_mesh(self, surface: str) -> TriangleMesh:
-        """The surface in the pose that the document holds; at rest without one."""
-        pose, rig = self.document.poses.get(surface), self.rigs.get(surface)
-        if pose is None:
-            return self.mesh(surface)
-        if rig is None:
-            raise InvalidInput(f"the rig of {surface!r} is not loaded: give it to the session by add_surface.")
-        local = rig.rest_local.copy()
-        for joint, matrix in zip(pose.joints, pose.local, strict=True):
-            local[rig.joint_index(joint)] = matrix
-        return self.mesh(surface).with_points(skin(rig, forward_kinematics(rig.parents, local)))
 
     def axis_request(self, surface: str, patch: str, points: SurfacePoints) -> AxisRequest:
         """What an axis generator gets for a patch: bones of the rig, and the axes drawn on the surface so far."""
