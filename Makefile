@@ -13,7 +13,7 @@ READY := $(VENV)/.ready
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test test-blender-all lint typecheck pytest wheel matrix bench docs contract-report clean
+.PHONY: help demo test explore test-blender-all lint typecheck pytest wheel matrix bench docs contract-report clean
 
 help:
 	@echo "make demo | test | lint | bench | docs | clean"
@@ -38,6 +38,12 @@ typecheck: $(READY)
 
 pytest: $(READY)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -q
+
+# The laws on examples that nobody drew before, ROUNDS times over.
+ROUNDS ?= 5
+explore: $(READY)
+	for round in $$(seq $(ROUNDS)); do OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 \
+		$(BIN)/pytest -n 2 --dist loadfile -q -m hypothesis --hypothesis-profile explore || exit 1; done
 
 # Blender 4.5 LTS, 5.0 and 5.2, each in an environment of its own (make test has 5.0 already).
 test-blender-all: $(READY)
