@@ -11,9 +11,12 @@ import contextlib
 import fcntl
 import hashlib
 import os
+import resource
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,7 +24,9 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 TESTS = REPOSITORY / "tests" / "adapters" / "blender"
 DEFAULT = "5.0"
 PYTHON_OF = {"4.2": "3.11", "4.5": "3.11", "5.0": "3.11", "5.1": "3.13", "5.2": "3.13"}  # as the wheels are tagged
-PATIENCE = 600  # seconds for one process
+PATIENCE = 600  # seconds for one process of Blender
+LAST_WORDS = 20  # seconds for a process that hangs to say where
+INSTALLING = 3600  # seconds to fetch and unpack a wheel of 400 MB
 MATRIX = ("4.5", "5.0", "5.2")
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
@@ -40,15 +45,15 @@ def environment(blender: str = DEFAULT) -> Path:
         if ready.is_file() and ready.read_text() == wanted:
             return python
         if not python.is_file():
-            subprocess.run([_interpreter(PYTHON_OF[blender]), "-m", "venv", str(folder)], check=True)
-        pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        made = subprocess.run(
-            [*pip, f"bpy=={blender}.*", "--editable", f"{REPOSITORY}[testing]"], capture_output=True, text=True
-        )
-        if made.returncode == 0:
+            _installing(_interpreter(PYTHON_OF[blender]), "-m", "venv", str(folder))
+        pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        try:
+            _installing(str(python), *pip, f"bpy=={blender}.*", "--editable", f"{REPOSITORY}[testing]")
+        except Unavailable as reason:
+            if not ready.is_file():  # else an older one serves, without a network too
+                raise Unavailable(f"bpy {blender} could not be installed: {reason}") from reason
+        else:
             ready.write_text(wanted)
-        elif not ready.is_file():  # else an older one serves, without a network too
-            raise Unavailable(f"bpy {blender} could not be installed: {made.stderr.strip().splitlines()[-1]}")
     return python
 
 
@@ -69,15 +74,55 @@ def run_script(python: Path, script: Path, *arguments: str) -> subprocess.Comple
 
 
 def _started(python: Path, command: list[str], variables: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    """Run to the end, or for PATIENCE; a Blender that hangs is a failure that says so."""
-    environ = {**os.environ, **ONE_CORE, **variables}
-    try:
-        return subprocess.run(
-            [str(python), *command], cwd=REPOSITORY, env=environ, capture_output=True, text=True, timeout=PATIENCE
+    """Run to the end, or for PATIENCE; a Blender that hangs is a failure that says so, and where.
+
+    Blender's temporary files and its user's settings are in a folder that goes with the process, however it ends.
+    """
+    with tempfile.TemporaryDirectory(prefix="contact-blender-", ignore_cleanup_errors=True) as folder:
+        own = {**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder), "BLENDER_USER_RESOURCES": folder}
+        process = subprocess.Popen(
+            [str(python), "-X", "faulthandler", *command],
+            cwd=REPOSITORY,
+            env={**os.environ, **ONE_CORE, **own, **variables},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,  # so that what it starts ends with it
         )
+        try:
+            said, complaint = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            said, complaint = _last_words(process)
+            complaint += f"\nBlender did not end within {PATIENCE} seconds; where its threads were stands above."
+            return subprocess.CompletedProcess(command, 1, said, complaint)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    return subprocess.CompletedProcess(command, process.returncode, said, complaint)
+
+
+def _last_words(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """What a process that hangs has said, with the stacks that Python's fault handler prints when it is aborted."""
+    if hasattr(resource, "prlimit"):  # no core file in the source tree
+        resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))
+    process.send_signal(signal.SIGABRT)
+    try:
+        return process.communicate(timeout=LAST_WORDS)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        return process.communicate()
+
+
+def _installing(*command: str) -> None:
+    """A step of making an environment. Raises Unavailable with the last line that it said."""
+    try:
+        made = subprocess.run(command, capture_output=True, text=True, timeout=INSTALLING)
     except subprocess.TimeoutExpired as late:
-        said = late.stdout.decode() if isinstance(late.stdout, bytes) else late.stdout or ""
-        return subprocess.CompletedProcess(command, 1, said, f"Blender did not end within {PATIENCE} seconds.")
+        raise Unavailable(f"{' '.join(command[1:4])} did not end within {INSTALLING} seconds") from late
+    if made.returncode:
+        raise Unavailable((made.stderr.strip() or made.stdout.strip() or "it said nothing").splitlines()[-1])
 
 
 @contextlib.contextmanager
@@ -93,11 +138,15 @@ def _interpreter(version: str) -> str:
     named = shutil.which(f"python{version}")
     installed = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"), reverse=True)
     for candidate in (sys.executable, *([named] if named else []), *map(str, installed)):
-        asked = subprocess.run(
-            [candidate, "-c", "import sys, venv; print('%d.%d' % sys.version_info[:2])"],
-            capture_output=True,
-            text=True,
-        )
+        try:
+            asked = subprocess.run(
+                [candidate, "-c", "import sys, venv; print('%d.%d' % sys.version_info[:2])"],
+                capture_output=True,
+                text=True,
+                timeout=60,
+            )
+        except (OSError, subprocess.TimeoutExpired):
+            continue
         if asked.returncode == 0 and asked.stdout.strip() == version:
             return candidate
     raise Unavailable(f"there is no Python {version} on this machine")

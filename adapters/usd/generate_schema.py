@@ -29,7 +29,7 @@ def generate() -> dict[str, str]:
     with tempfile.TemporaryDirectory() as folder:
         # In a process of its own: it sets variables of the environment that cripple every later USD.
         command = [sys.executable, str(generator), str(SCHEMA / "schema.usda"), folder]
-        subprocess.run(command, check=True, capture_output=True)
+        subprocess.run(command, check=True, capture_output=True, timeout=300)
         schema = (Path(folder) / "generatedSchema.usda").read_text(encoding="utf-8")
         plugin = (Path(folder) / "plugInfo.json").read_text(encoding="utf-8")
     for placeholder, value in PLACEHOLDERS.items():

@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,8 @@ if IN_BLENDER:
     def pytest_unconfigure(config: pytest.Config) -> None:
         """Leave without Blender's own end: as a module it now and then hangs there (seen in 4.5)."""
         if _STATUS in config.stash:
+            if "bpy" in sys.modules:  # which would have removed this folder
+                shutil.rmtree(sys.modules["bpy"].app.tempdir, ignore_errors=True)
             sys.stdout.flush(), sys.stderr.flush()
             os._exit(config.stash[_STATUS])
 
