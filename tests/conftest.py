@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# A green commit stays green: the examples of a law are drawn by its own text, the same on every machine. New ones are
-# sought by `make explore`, and what it finds is mended, and kept by an example of its own.
+# A green commit stays green: the examples of a law are drawn by its own text, the same on every machine. New ones
+# are sought by `make explore`; what it finds is mended, and kept by an example of its own.
 settings.register_profile("same", derandomize=True)
 settings.register_profile("explore", derandomize=False, print_blob=True)
 settings.load_profile("same")
