@@ -1,8 +1,8 @@
 """The default solver: bounded Levenberg-Marquardt from several starts.
 
-Each start gets a few iterations; the best two go on to the end (SOLVER.md's measured recipe against the
-paper's weakness with large wrist motion). The step solves (A + mu D) s = -g, D = diag A, within the limits
-by an active set, with Nielsen's rule for mu (Madsen, Nielsen, Tingleff: Methods for Non-Linear Least Squares
+Each start gets a few iterations; the best two go on to the end, which is measured (docs/pose-grips.md) against the
+paper's weakness with large wrist motion. A step minimises g.s + s.(A + mu D) s / 2, D = diag A, exactly within the
+limits (`box`), with Nielsen's rule for mu (Madsen, Nielsen, Tingleff: Methods for Non-Linear Least Squares
 Problems, 2004).
 """
 
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact_core.arrays import BoolArray, FloatArray
+from contact_core.arrays import FloatArray
+from contact_core.pose.box import box_minimum
 from contact_core.pose.candidates import starting_thetas
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
@@ -124,26 +125,7 @@ class Descent:
 def bounded_step(
     matrix: FloatArray, gradient: FloatArray, damping: float, lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
-    """The minimiser (nearly) of g.s + s.(A + damping D).s / 2 over lower <= s <= upper.
-
-    Active set: dofs at a limit that the gradient pushes outward stay; a solved step that leaves the box pins
-    the dofs that left, and the rest is solved again with them in place.
-    """
+    """(d,) the minimiser of g.s + s.(A + damping D).s / 2 over lower <= s <= upper, with D = diag A."""
     diagonal = np.diagonal(matrix)
     floor = 1e-9 * max(float(diagonal.max(initial=0.0)), 1e-30)  # dofs that nothing holds stay put
-    damped = matrix + np.diag(damping * diagonal + floor)
-    step = np.zeros(len(gradient))
-    free: BoolArray = ~(((lower >= 0.0) & (gradient > 0.0)) | ((upper <= 0.0) & (gradient < 0.0)))
-    for _ in range(10):  # each round pins at least one dof or ends; ten have always been enough to fit
-        index = np.flatnonzero(free)
-        if not len(index):
-            break
-        pinned = np.flatnonzero(~free)
-        right = -gradient[index] - damped[np.ix_(index, pinned)] @ step[pinned]
-        step[index] = np.linalg.solve(damped[np.ix_(index, index)], right)
-        outside = free & ((step < lower) | (step > upper))
-        if not outside.any():
-            break
-        step[outside] = np.clip(step[outside], lower[outside], upper[outside])
-        free &= ~outside
-    return np.clip(step, lower, upper)
+    return box_minimum(matrix + np.diag(damping * diagonal + floor), gradient, lower, upper)

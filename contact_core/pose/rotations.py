@@ -46,14 +46,14 @@ def euler_chain(angles: FloatArray, axes: IntArray) -> tuple[FloatArray, FloatAr
     angles: (k, 3) radians. axes: (k, 3) which coordinate axis (0, 1, 2) each turn is about.
     Column i of the second answer is the axis about which R turns when angle i grows.
     """
-    k = len(angles)
-    rotation = np.broadcast_to(np.eye(3), (k, 3, 3))
-    turning = np.empty((k, 3, 3))
-    for i in range(3):
-        unit = np.eye(3)[axes[:, i]]  # (k, 3)
-        turning[:, :, i] = np.einsum("kab,kb->ka", rotation, unit)
-        rotation = rotation @ exponential(angles[:, i, None] * unit)[0]
-    return rotation, turning
+    axis = np.eye(3)[axes]  # (k, 3, 3) a row per turn
+    turns = exponential((angles[:, :, None] * axis).reshape(-1, 3))[0].reshape(-1, 3, 3, 3)
+    first, second = turns[:, 0], turns[:, 0] @ turns[:, 1]
+    turning = np.stack(
+        [axis[:, 0], np.einsum("kab,kb->ka", first, axis[:, 1]), np.einsum("kab,kb->ka", second, axis[:, 2])],
+        axis=-1,
+    )
+    return second @ turns[:, 2], turning
 
 
 @lru_cache(maxsize=64)

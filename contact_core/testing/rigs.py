@@ -76,6 +76,13 @@ def limited_freedom(index: int) -> JointFreedom:
     return JointFreedom("ball", lower=np.array([-0.4, -0.5, -1.3]), upper=np.array([0.4, 0.5, 1.3]))
 
 
+def narrow_freedom(index: int) -> JointFreedom:
+    """A free root and ball joints that hardly turn: what is reached with them is reached at their limits."""
+    if index == 0:
+        return JointFreedom("ball", translates=True)
+    return JointFreedom("ball", lower=np.array([-0.05, -0.1, -1.0]), upper=np.array([0.05, 0.1, 0.1]))
+
+
 def scattered_points(rig: Rig, count: int, seed: int) -> SurfacePoints:
     """`count` random points on the skin, by face."""
     random = np.random.default_rng(seed)
