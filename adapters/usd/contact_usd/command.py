@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+_MOST_FRAMES = 100_000  # in one range: an hour at 24 frames a second
 
 
 class UsdCommand:
@@ -166,10 +169,13 @@ def _each_shot(arguments: argparse.Namespace, work: Callable[[Path, Path | None]
 
     results: list[dict[str, object]] = []
     lines = []
+    written: dict[Path, Path] = {}  # the shot behind each place in which layers are written
     for number, path in enumerate(arguments.shots):
         arguments.output.progress(number / len(arguments.shots), path.name)
-        out = None if arguments.out is None else arguments.out / f"{path.name.split('.')[0]}.contact.usda"
+        name = f"{path.stem.removesuffix('.contact')}.contact.usda"
+        out = None if arguments.out is None else arguments.out / name
         try:
+            _check_alone(path, written.setdefault((out or path.with_name(name)).absolute(), path), name)
             facts = work(path, out)
         except ContactError as error:
             results.append({"shot": str(path), "failed": str(error)})
@@ -179,6 +185,14 @@ def _each_shot(arguments: argparse.Namespace, work: Callable[[Path, Path | None]
             lines.append(f"{path}: {_told(facts)}")
     arguments.output.answer(results, "\n".join(lines))
     return int(any("failed" in result for result in results))
+
+
+def _check_alone(path: Path, first: Path, name: str) -> None:
+    """Shots of one name would write one layer, and only the last would be left."""
+    from contact_core.errors import InvalidInput
+
+    if first is not path:
+        raise InvalidInput(f"{first} and this shot both write {name} there; give each an --out folder of its own.")
 
 
 def _told(facts: dict[str, Any]) -> str:
@@ -193,12 +207,19 @@ def _told(facts: dict[str, Any]) -> str:
 def _frames(text: str) -> list[float]:
     """1,5,10-20 as numbers, rising."""
     frames: set[float] = set()
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        try:
-            frames |= set(map(float, range(int(first), int(last) + 1))) if dash and first else {float(part)}
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(f"frames are like 1,5,10-20, but {text!r} came") from error
+    try:
+        for part in text.split(","):
+            first, dash, last = part.strip().partition("-")
+            several = range(int(first), int(last) + 1) if dash and first else None
+            if several is not None and not 0 < len(several) <= _MOST_FRAMES:
+                raise ValueError
+            frames |= {float(part)} if several is None else set(map(float, several))
+        if not all(map(math.isfinite, frames)):
+            raise ValueError
+    except (ValueError, OverflowError) as error:
+        raise argparse.ArgumentTypeError(
+            f"frames are like 1,5,10-20, rising and at most {_MOST_FRAMES} in a range, but {text!r} came"
+        ) from error
     return sorted(frames)
 
 

@@ -213,6 +213,6 @@ def _frame_facts(frame: float | None, k: int, solved: SequenceSolution) -> dict[
     return {
         "frame": frame,
         "status": solution.status.name,
-        "value": solution.value,
-        "start_value": solution.start_value,
+        "value": solution.value if np.isfinite(solution.value) else None,
+        "start_value": solution.start_value if np.isfinite(solution.start_value) else None,
     }

@@ -140,12 +140,14 @@ def refusing(path: Path) -> Iterator[None]:
         yield
     except ContactError:
         raise
-    except (Tf.ErrorException, RuntimeError, UnicodeDecodeError) as error:
+    except (Tf.ErrorException, RuntimeError, UnicodeError) as error:
         raise FileRefused(f"{path} cannot be used as a USD layer: {reason(error)}") from error
 
 
 def reason(error: Exception) -> str:
     """What USD says is wrong, without the places in its sources; a damaged file may be quoted, bytes and all."""
+    if isinstance(error, UnicodeEncodeError):
+        return "USD has no way to say a name that is not Unicode. Rename it."
     try:
         said = error.args[0].commentary if isinstance(error, Tf.ErrorException) else str(error)
     except UnicodeDecodeError:

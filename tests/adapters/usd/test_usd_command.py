@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -162,3 +163,40 @@ def test_without_pxr_it_says_what_to_install(
     monkeypatch.setitem(sys.modules, "pxr", None)
     assert main(["usd", "inspect", "any.usda"]) == 2
     assert 'pip install "contact-core[usd]"' in capsys.readouterr().err
+
+
+def test_shots_that_would_write_one_layer_are_told_apart(
+    sequence: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Versions of a shot keep their names; two shots of one name cannot go into one folder."""
+    shots = []
+    for name in ("shot010.v001.usda", "shot010.v002.usda", "a/layout.usda", "b/layout.usda"):
+        shots.append(sequence / name)
+        shots[-1].parent.mkdir(exist_ok=True)
+        shots[-1].write_bytes((sequence / "asset.usda").read_bytes())
+    out = sequence / "work"
+    code, facts = told(capsys, "transfer", sequence / "contacts.usda", *shots, "--out", out)
+    assert code == 1 and ["failed" in item for item in facts] == [False, False, False, True]
+    assert "a/layout.usda and this shot both write layout.contact.usda" in facts[3]["failed"]
+    written = ["layout.contact.usda", "shot010.v001.contact.usda", "shot010.v002.contact.usda"]
+    assert sorted(path.name for path in out.iterdir()) == written
+    code, _ = told(capsys, "solve", out / written[0], "--frames", "1", "--out", sequence / "solved")
+    assert code == 0 and [path.name for path in (sequence / "solved").iterdir()] == written[:1]
+
+
+@pytest.mark.parametrize("frames", ["20-10", "nan", "inf", "1-3000000000", "1,,2", "1-2-3", "a"])
+def test_frames_that_are_none_are_refused(frames: str, sequence: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["usd", "solve", str(sequence / "contacts.usda"), "--frames", frames])
+    assert left.value.code == 2 and "frames are like 1,5,10-20" in capsys.readouterr().err
+
+
+def test_a_name_that_is_not_unicode_is_refused_in_words(sequence: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = Path(str(sequence), os.fsdecode(b"\xff.usda"))
+    try:
+        path.write_bytes((sequence / "asset.usda").read_bytes())
+    except (OSError, UnicodeEncodeError):
+        pytest.skip("this file system has Unicode names only")
+    assert main(["usd", "inspect", str(path)]) == 2
+    assert "not Unicode" in capsys.readouterr().err
+    assert main(["usd", "transfer", str(sequence / "contacts.usda"), str(path)]) == 1
