@@ -6,16 +6,21 @@ deleted at any time. Files are numpy archives (never pickles) under a content ke
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from contact_core.errors import FileRefused
+from contact_core.whole_file import replacing
 
 
 def cache_directory() -> Path | None:
@@ -43,16 +48,15 @@ def cached_arrays(
         try:
             with np.load(path, allow_pickle=False) as archive:
                 return {name: archive[name] for name in archive.files}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
             pass  # a damaged file is made again
     arrays = make()
     if path is not None:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
+            with replacing(path) as part:
                 np.savez_compressed(part, allow_pickle=False, **arrays)
-            Path(part.name).replace(path)
-        except OSError:
+        except (OSError, FileRefused):
             pass
     return arrays
 
@@ -62,10 +66,13 @@ def _candidates() -> list[Path]:
     if named:
         return [Path(named)]
     if sys.platform == "win32":
-        system = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        system = os.environ.get("LOCALAPPDATA") or "~/AppData/Local"
     elif sys.platform == "darwin":
-        system = Path.home() / "Library" / "Caches"
+        system = "~/Library/Caches"
     else:
-        system = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        system = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     user = os.getuid() if hasattr(os, "getuid") else "user"
-    return [system / "contact-core", Path(tempfile.gettempdir()) / f"contact-core-{user}"]
+    places = [Path(tempfile.gettempdir()) / f"contact-core-{user}"]
+    with contextlib.suppress(RuntimeError):  # the user of a container may have no home
+        places.insert(0, Path(system).expanduser() / "contact-core")
+    return places

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -16,28 +16,35 @@ _SHOW_AFTER_S = 1.0  # a bar for anything longer than a second, and none for wha
 
 
 class Output:
-    """json: one JSON document on stdout and nothing else. quiet: no progress and no remarks."""
+    """json: one JSON document on stdout and nothing else. quiet: no progress and no remarks. stdout: where answers
+    go, where sys.stdout is lent to others."""
 
-    def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
+    def __init__(self, *, json: bool = False, quiet: bool = False, stdout: TextIO | None = None) -> None:
         self.json = json
         self.quiet = quiet
+        self._stdout = stdout
         self._bar: Progress | None = None
         self._task: TaskID | None = None
         self._since = time.monotonic()
 
     def answer(self, data: Mapping[str, Any] | Sequence[Any], text: str) -> None:
         """The result of a command: `data` when JSON was asked for, else `text`."""
-        print(json.dumps(data, indent=2, ensure_ascii=False) if self.json else text)  # noqa: T201  # the one place
+        stdout = self._stdout or sys.stdout
+        if self.json:
+            text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+            if not _fits(text, stdout):  # still the same JSON
+                text = json.dumps(data, indent=2, allow_nan=False)
+        _say(text, stdout)
 
     def remark(self, text: str) -> None:
         """Something worth knowing that is not the answer."""
         if not self.quiet:
-            print(text, file=sys.stderr)  # noqa: T201
+            _say(text, sys.stderr)
 
     @staticmethod
     def error(text: str) -> None:
         """One sentence on stderr."""
-        print(f"contact: {text}", file=sys.stderr)  # noqa: T201
+        _say(" ".join(f"contact: {text}".split()), sys.stderr)
 
     def progress(self, fraction: float, text: str) -> bool:
         """A step of something long: fraction 0..1 done. Always True: on a command line, Ctrl+C is what cancels."""
@@ -64,6 +71,22 @@ class Output:
         finally:
             if self._bar is not None:
                 self._bar.stop()
+
+
+def _say(text: str, stream: TextIO) -> None:
+    """Print, and learn at once when nobody can read it; letters that the stream does not know are spelt out."""
+    if not _fits(text, stream):
+        text = text.encode("ascii", "backslashreplace").decode()
+    print(text, file=stream, flush=True)  # the one place
+
+
+def _fits(text: str, stream: TextIO) -> bool:
+    """Whether a stream can print a text: a terminal in the C locale knows no umlaut."""
+    try:
+        text.encode(getattr(stream, "encoding", None) or "utf-8", getattr(stream, "errors", None) or "strict")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def columns(rows: Sequence[Sequence[str]], *, indent: str = "") -> str:

@@ -38,4 +38,9 @@ def _text(record: PluginRecord) -> str:
     lines += [f"    {noun}: {', '.join(names)}" for noun, names in record.offers.items()]
     lines += [f"    - {sentence}" for sentence in record.absent]
     lines += [f"    ! {problem}" for problem in record.problems]
-    return "\n".join(lines)
+    return "\n".join(map(_printable, lines))
+
+
+def _printable(line: str) -> str:
+    """A line without what would steer a terminal: names and errors are as foreign as the plugins."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in line)

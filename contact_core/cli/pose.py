@@ -33,6 +33,9 @@ class Pose:
 
 def tell(result: JobResult, output: Output) -> None:
     """The metrics as a table, what failed, and where the files are."""
+    for note in result.report["notes"]:
+        if "renderer" in note:  # the picture is plainer than it could be, or missing
+            output.remark(f"contact: {note}")
     lines = [columns([("!" if failed else " ", name, value) for name, value, failed in result.table])]
     lines += [f"! {failure}" for failure in result.verdict.failures]
     lines += [f"{role}: {path}" for role, path in result.files.items()]

@@ -16,6 +16,8 @@ from contact_core.job.recipe import AssetSource, ObjectSpec
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS, SAMPLES
 
+_MOST_LENGTHS = 1e4  # that an object is larger or smaller than the manipulator: a hand holds a pin, and a hull
+
 
 def read_source(source: AssetSource, plugins: PluginManager, folder: Path | None = None) -> Asset:
     """The asset that a recipe names. Raises FileRefused, InvalidInput."""
@@ -79,9 +81,18 @@ def _candidates(name: str, folder: Path | None) -> Iterator[Path]:
             yield from sorted(path for path in place.rglob(plain) if path.is_file())
 
 
-def object_mesh(asset: Asset, spec: ObjectSpec, meters_per_unit: float) -> TriangleMesh:
-    """The object's surface in the manipulator's units (`meters_per_unit`), the recipe's scale applied."""
+def object_mesh(asset: Asset, spec: ObjectSpec, meters_per_unit: float, length: float) -> TriangleMesh:
+    """The object's surface in the manipulator's units (`meters_per_unit`), the recipe's scale applied.
+
+    length: of the manipulator. Raises InvalidInput for an object of a size that only a wrong unit explains.
+    """
     factor = spec.scale * (1.0 if asset.meters_per_unit is None else asset.meters_per_unit / meters_per_unit)
+    share = factor * asset.mesh.bounding_box_diagonal / length
+    if not 1.0 / _MOST_LENGTHS <= share <= _MOST_LENGTHS:
+        raise InvalidInput(
+            f"the object {asset.name} is {share:.2g} lengths of the manipulator across; mend object.scale, or the"
+            " units of one of the two files (`contact inspect` tells them)."
+        )
     return asset.mesh if factor == 1.0 else TriangleMesh(asset.mesh.points * factor, asset.mesh.faces)
 
 

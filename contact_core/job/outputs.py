@@ -1,8 +1,10 @@
-"""What a job leaves on the disk: document, pose, posed model, pictures, report. Each file whole or not at all."""
+"""What a job leaves on the disk: document, pose, posed model, pictures, report. All of them, or nothing."""
 
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,27 +19,33 @@ from contact_core.plugins.registry import FORMATS, RENDERERS
 from contact_core.plugins.slots import Picture
 from contact_core.pose.rig import Pose
 from contact_core.whole_file import write_whole
+from contact_core.whole_set import replacing_together
+
+# What a job leaves, by role; a picture only where something can draw it.
+FILES = {
+    "document": "document.json",
+    "pose": "pose.json",
+    "model": "posed.glb",
+    "picture": "picture.png",
+    "report": "report.json",
+}
 
 
 def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
     """Draw and write everything. Raises FileRefused where `out` cannot be written."""
-    files: dict[str, Path] = {}
-    with job.stage("write", 0.75, "Writing the document, the pose and the model"):
-        files["document"] = out / "document.json"
-        write_whole(files["document"], dump_document(job.session.document))
-        files["pose"] = out / "pose.json"
-        write_whole(files["pose"], pose_json(job.rig.name, job.pose))
-        files |= _write_model(job, out, plugins)
     rows = table(job.metrics, job.verdict)
-    with job.stage("render", 0.8, "Drawing the pictures"):
-        renderer = draw(job, pictures_of(job, rows), out / "picture.png", plugins)
-        if renderer is not None:
-            files["picture"] = out / "picture.png"
-    report = report_of(job, renderer)
-    files["report"] = out / "report.json"
-    write_whole(files["report"], json.dumps(report, indent=2) + "\n")
+    with replacing_together(out, FILES.values()) as stage:
+        with job.stage("write", 0.75, "Writing the document, the pose and the model"):
+            write_whole(stage / FILES["document"], dump_document(job.session.document))
+            write_whole(stage / FILES["pose"], pose_json(job.rig.name, job.pose))
+            _write_model(job, stage / FILES["model"], plugins)
+        with job.stage("render", 0.8, "Drawing the pictures"):
+            renderer = draw(job, pictures_of(job, rows), stage / FILES["picture"], plugins)
+        report = report_of(job, renderer)
+        write_whole(stage / FILES["report"], json.dumps(report, indent=2, allow_nan=False) + "\n")
+        written = {role: out / name for role, name in FILES.items() if (stage / name).exists()}
     job.tell(1.0, "Done")
-    return JobResult(job.recipe, report, job.verdict, files, rows)
+    return JobResult(job.recipe, report, job.verdict, written, rows)
 
 
 def draw(job: Job, pictures: list[Picture], path: Path, plugins: PluginManager) -> str | None:
@@ -54,17 +62,15 @@ def draw(job: Job, pictures: list[Picture], path: Path, plugins: PluginManager) 
     return None
 
 
-def _write_model(job: Job, out: Path, plugins: PluginManager) -> dict[str, Path]:
-    """posed.glb with the manipulator in its pose and the object where it lies, by the format that writes .glb."""
+def _write_model(job: Job, path: Path, plugins: PluginManager) -> None:
+    """A model with the manipulator in its pose and the object where it lies, by the format that writes .glb."""
     writers = [f for f in plugins.offers(FORMATS).values() if f.can_write and ".glb" in f.suffixes]
     if not writers:
         job.notes.append("no plugin writes .glb, so there is no posed model.")
-        return {}
-    path = out / "posed.glb"
+        return
     standing = Pose((job.object.name,), job.placed[None])
     poses = {job.manipulator.name: job.pose, job.object.name: standing}
     writers[0].write(path, [job.manipulator, job.object], poses)
-    return {"model": path}
 
 
 def pose_json(rig: str, pose: Pose) -> str:
@@ -82,28 +88,39 @@ def pose_json(rig: str, pose: Pose) -> str:
 def report_of(job: Job, renderer: str | None) -> dict[str, Any]:
     """The content of report.json."""
     metrics = dict(job.metrics)
-    return {
-        "schema": "contact.report",
-        "version": SCHEMA,
-        "contact_core": __version__,
-        "recipe": job.recipe.name,
-        "verdict": "grasp" if job.verdict.is_grasp else "bad",
-        "failures": list(job.verdict.failures),
-        "failed_patches": dict(job.verdict.failed_patches),
-        **{key: metrics[key] for key in metrics if key != "patches"},
-        "limits": dict(job.verdict.limits),
-        "patches": metrics["patches"],
-        "left_out": dict(job.placement.left_out),
-        "dofs": len(job.solution.theta),
-        "iterations": len(job.solution.trace),
-        "status": job.solution.status.name.lower(),
-        "message": job.solution.message,
-        "trace": [float(value) for value in job.solution.trace],
-        "start_distance": job.start_distance / job.length,
-        "manipulator_length": job.length,
-        "meters_per_unit": job.rig.meters_per_unit,
-        "renderer": renderer,
-        "seconds": {key: round(value, 4) for key, value in job.seconds.items()},
-        "notes": list(job.notes),
-        "definitions": DEFINITIONS,
-    }
+    return _finite(
+        {
+            "schema": "contact.report",
+            "version": SCHEMA,
+            "contact_core": __version__,
+            "recipe": job.recipe.name,
+            "verdict": "grasp" if job.verdict.is_grasp else "bad",
+            "failures": list(job.verdict.failures),
+            "failed_patches": dict(job.verdict.failed_patches),
+            **{key: metrics[key] for key in metrics if key != "patches"},
+            "limits": dict(job.verdict.limits),
+            "patches": metrics["patches"],
+            "left_out": dict(job.placement.left_out),
+            "dofs": len(job.solution.theta),
+            "iterations": len(job.solution.trace),
+            "status": job.solution.status.name.lower(),
+            "message": job.solution.message,
+            "trace": [float(value) for value in job.solution.trace],
+            "start_distance": job.start_distance / job.length,
+            "manipulator_length": job.length,
+            "meters_per_unit": job.rig.meters_per_unit,
+            "renderer": renderer,
+            "seconds": {key: round(value, 4) for key, value in job.seconds.items()},
+            "notes": list(job.notes),
+            "definitions": DEFINITIONS,
+        }
+    )
+
+
+def _finite(value: Any) -> Any:
+    """The same with null for what is no number, for which JSON has no word."""
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -22,6 +22,7 @@ from contact_core.plugins.registry import AXIS_GENERATORS
 from contact_core.pose.bones import bones_of
 from contact_core.pose.rig import Rig
 
+_UPRIGHT = 0.05  # sine of the angle to the normal below which a direction tells no heading
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
@@ -42,6 +43,9 @@ def disk(asset: Asset, spec: DiskSpec) -> SurfacePoints:
 
     Ring i of the sunflower lies at radius sqrt(i / count), so equal areas carry equal numbers of points.
     """
+    reach = asset.mesh.bounding_box_diagonal
+    if spec.radius > reach:
+        raise InvalidInput(f"its radius is {spec.radius:g}, but {asset.name} is only {reach:.3g} units across.")
     centre = locate(spec.at, asset)
     place = np.arange(spec.count)
     spokes = spec.radius * np.sqrt(place / (spec.count - 1)) * np.exp(1j * _GOLDEN_ANGLE * place)  # (n,)
@@ -67,7 +71,13 @@ def explicit_root(spec: RootSpec, asset: Asset) -> tuple[SurfacePoints, complex]
     """The root (one point) that a recipe gives a patch on the object, and the heading of its axis there."""
     root = locate(spec.root, asset)
     if spec.aim is None:
-        return root, complex(direction_to_heading(asset.mesh, root, np.array([spec.direction]))[0])
+        direction = np.array([spec.direction])
+        upright = np.linalg.norm(np.cross(direction, root.normals(asset.mesh))) / np.linalg.norm(direction)
+        if upright < _UPRIGHT:
+            raise InvalidInput(
+                "the direction of a patch stands upright on the object at its root; give one along it."
+            )
+        return root, complex(direction_to_heading(asset.mesh, root, direction)[0])
     log = log_map(asset.mesh, root, locate(spec.aim, asset))
     if log.anchor[0] < 0 or not log.distance[0] > 0:
         raise InvalidInput("the point that a patch aims at must be another point on the same part of the object.")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
+from typing import Any
 
 from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.job.recipe import (
@@ -19,7 +19,7 @@ from contact_core.job.recipe import (
     SolveSpec,
     ViewSpec,
 )
-from contact_core.job.table import Table
+from contact_core.job.table import Table, parse_toml
 
 SCHEMA = 1
 _LARGEST_FILE = 4_000_000  # bytes
@@ -40,12 +40,7 @@ def load_recipe(path: Path) -> Recipe:
 
 def parse_recipe(text: str, *, name: str, folder: Path | None = None) -> Recipe:
     """A recipe out of TOML text. Raises InvalidInput naming the table and key."""
-    try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidInput(f"{name} is not TOML: {error}.") from error
-    except RecursionError as error:
-        raise InvalidInput(f"{name} is nested too deeply for a recipe.") from error
+    values = parse_toml(text, name)
     try:
         return _recipe(Table(values, "recipe"), folder)
     except ContactError as error:
@@ -96,7 +91,9 @@ def _source(table: Table, *, sidecar: bool = False, done: bool = True) -> AssetS
     if done:
         table.done()
     if kind == "sample":
-        return AssetSource(sample=value, sidecar=beside)
+        if beside is not None:
+            raise InvalidInput(f"{table.where}.rig goes with a file; the sample {value!r} has its own limits.")
+        return AssetSource(sample=value)
     return AssetSource(file=value, sha256=digest and digest.lower(), sidecar=beside)
 
 
@@ -138,6 +135,8 @@ def _patch(table: Table, name: str, joint: str | None) -> PatchSpec:
             count=inner.count("points", 80, at_least=3, at_most=20_000),
         )
         inner.done()
+    elif table.raw(kind) == []:
+        raise InvalidInput(f"{table.where}.{kind} holds no point; a patch has at least one.")
     axis = table.table("axis", None)
     place = table.table("place") if "place" in table else None
     spec = PatchSpec(
@@ -215,12 +214,23 @@ def _solve(table: Table) -> SolveSpec:
         penetration=table.number("penetration", 5.0, at_least=0.0),
         limits=table.flag("limits", True),
         settle=table.count("settle", 0, at_most=10),
-        options=dict(table.table("options", None).values),
+        options=_solve_options(table.table("options", None)),
     )
     table.done()
     if min(spec.weights) < 0:
         raise InvalidInput(f"{table.where}.weights are not negative, but {list(spec.weights)} came.")
     return spec
+
+
+def _solve_options(table: Table) -> dict[str, Any]:
+    """What every solver understands is checked here; what is left is the solver's own, which checks it itself."""
+    options = {key: table.raw(key) for key in table.values}
+    table.count("max_iterations", 1, at_least=1)
+    table.number("tolerance", 0.0, at_least=0.0)
+    table.count("seed", 0, at_most=2**32 - 1)
+    if "candidates" in table:
+        options["candidates"] = table.texts("candidates")
+    return options
 
 
 def _accept(table: Table) -> dict[str, float]:

@@ -17,7 +17,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.assets import object_mesh, read_source, solids_of
 from contact_core.job.metrics import Contact, PosedScene, measure
-from contact_core.job.outputs import write_outputs
+from contact_core.job.outputs import FILES, write_outputs
 from contact_core.job.painting import axis_picks, explicit_root, paint
 from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import load_recipe
@@ -31,6 +31,7 @@ from contact_core.plugins.slots import PlacementRequest, PlacementResult
 from contact_core.pose.bones import bone_segments
 from contact_core.pose.rig import Pose
 from contact_core.session import Session
+from contact_core.whole_set import check_writable
 
 HAND, OBJECT = "manipulator", "object"  # names of the two surfaces in the document
 
@@ -50,8 +51,9 @@ def run(
     progress: JobProgress | None = None,
 ) -> JobResult:
     """Run a recipe and write document, pose, posed model, pictures and report into `out`."""
-    plugins = plugins or PluginManager()
-    return write_outputs(perform(recipe, plugins, progress=progress), Path(out), plugins)
+    plugins, out = plugins or PluginManager(), Path(out)
+    check_writable(out, FILES.values())  # before the work, not after it
+    return write_outputs(perform(recipe, plugins, progress=progress), out, plugins)
 
 
 def perform(recipe: Recipe, plugins: PluginManager, *, progress: JobProgress | None = None) -> Job:
@@ -80,7 +82,7 @@ def _read(job: Job, plugins: PluginManager) -> None:
             )
         unit = job.rig.meters_per_unit
         raw = read_source(recipe.object.source, plugins, recipe.folder)
-        mesh = object_mesh(raw, recipe.object, unit)
+        mesh = object_mesh(raw, recipe.object, unit, job.length)
         job.object = Asset(
             f"{raw.name} (object)" if raw.name == job.manipulator.name else raw.name, mesh, None,
             raw.source_vertices, raw.source_faces, unit, raw.up_axis, raw.notes, raw.details,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contact_core.errors import Cancelled, InvalidInput
+from contact_core.errors import Cancelled
 from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_TERMS
@@ -21,16 +21,14 @@ def solve(job: Job, plugins: PluginManager, *, again: bool = False) -> tuple[Pos
     """
     problem = pose_problem(job, plugins, job.pose if again else job.start)
     wanted = dict(job.recipe.solve.options)
-    try:
-        options = SolveOptions(
-            max_iterations=wanted.pop("max_iterations", 200),
-            tolerance=wanted.pop("tolerance", 1e-5),
-            candidates=("current",) if again else tuple(wanted.pop("candidates", SolveOptions().candidates)),
-            seed=wanted.pop("seed", 0),
-            more=wanted,
-        )
-    except TypeError as error:
-        raise InvalidInput(f"solve.options: {error}.") from error
+    candidates = tuple(wanted.pop("candidates", SolveOptions().candidates))
+    options = SolveOptions(
+        max_iterations=wanted.pop("max_iterations", 200),
+        tolerance=wanted.pop("tolerance", 1e-5),
+        candidates=("current",) if again else candidates,
+        seed=wanted.pop("seed", 0),
+        more=wanted,
+    )
     most = options.max_iterations
 
     def seen(iteration: Iteration) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar, overload
 
@@ -12,6 +13,20 @@ from contact_core.errors import InvalidInput
 T = TypeVar("T")
 Vector = tuple[float, float, float]
 _REQUIRED: Any = object()
+LARGEST = 1e30  # of any number: what is larger overflows once it is squared
+SMALLEST = 1e-30  # of a direction's largest part: what is smaller vanishes once it is squared
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """The values in TOML text. Raises InvalidInput that begins with `name`, whatever is wrong with the text."""
+    try:
+        return tomllib.loads(text.removeprefix("\ufeff"))  # Windows editors begin their files so
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInput(f"{name} is not TOML: {error}.") from error
+    except RecursionError as error:
+        raise InvalidInput(f"{name} is nested too deeply.") from error
+    except ValueError as error:  # Python itself refuses whole numbers of thousands of digits
+        raise InvalidInput(f"{name} holds a number of more digits than any that is meant.") from error
 
 
 class Table:
@@ -86,7 +101,9 @@ class Table:
     def vector(self, key: str, default: Any = _REQUIRED, *, direction: bool = False) -> Any:
         """Three finite numbers as a tuple; a direction is not zero."""
         wanted = "three numbers" + (", not all zero" if direction else "")
-        value = self._checked(key, default, wanted, lambda v: _is_vector(v) and (not direction or any(v)))
+        value = self._checked(
+            key, default, wanted, lambda v: _is_vector(v) and (not direction or max(map(abs, v)) >= SMALLEST)
+        )
         return tuple(float(x) for x in value) if isinstance(value, list) else value
 
     def vectors(self, key: str, default: Any = _REQUIRED) -> tuple[Vector, ...]:
@@ -110,10 +127,7 @@ class Table:
 
     def counts(self, key: str, default: Any = _REQUIRED) -> tuple[int, ...]:
         """A list of whole numbers, none negative."""
-        value = self._checked(
-            key, default, "a list of whole numbers", _is_counts
-        )  # fmt: skip
-        return tuple(value)
+        return tuple(self._checked(key, default, "a list of whole numbers", _is_counts))
 
     def table(self, key: str, default: Any = _REQUIRED) -> Table:
         """A table inside this one."""
@@ -144,7 +158,7 @@ class Table:
 
 
 def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and math.isfinite(value)
+    return type(value) in (int, float) and abs(value) <= LARGEST  # nan, inf and 10**400 are not
 
 
 def _is_vector(value: Any) -> bool:
@@ -156,9 +170,12 @@ def _is_list(value: Any, longest: int) -> bool:
 
 
 def _spell(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of thousands of digits, written in base 16
+        return "a number without end"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _is_counts(value: Any) -> bool:
-    return _is_list(value, 1_000_000) and all(type(item) is int and item >= 0 for item in value)
+    return _is_list(value, 1_000_000) and all(type(item) is int and 0 <= item < 2**62 for item in value)

@@ -8,43 +8,22 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 import pluggy
 
-from contact_core.errors import InvalidInput, MissingExtra
+from contact_core.errors import InvalidInput
 from contact_core.plugins import hookspecs
 from contact_core.plugins.checks import api_refusal, hook_mistakes, is_wrapper
-from contact_core.plugins.discovery import Candidate, Origin, discovered
+from contact_core.plugins.discovery import Candidate, discovered
+from contact_core.plugins.record import Offer, PluginRecord
 from contact_core.plugins.registry import SLOTS, Slot, resolve, shortcomings
 
 T = TypeVar("T")
+MOST_OFFERS = 1_000  # of one hook of one plugin: a generator without an end must not hang the program
 
-
-@dataclass
-class PluginRecord:
-    """What is known of one plugin. source: distribution and version, or where else it came from.
-
-    problems: sentences, empty when all is well.  absent: sentences on what a library that is not installed would
-    bring; that is no problem.  offers: noun of a slot -> names, filled as slots are asked for.
-    """
-
-    name: str
-    origin: Origin
-    source: str
-    plugin: object | None = None  # None: it could not be used at all
-    replaces: tuple[str, ...] = ()
-    problems: list[str] = field(default_factory=list)
-    absent: list[str] = field(default_factory=list)
-    offers: dict[str, list[str]] = field(default_factory=dict)
-    collected: dict[str, list[Any]] = field(default_factory=dict, repr=False)  # hook -> sound objects
-
-    def complain(self, sentence: str) -> None:
-        """Write a problem down, once."""
-        if sentence not in self.problems:
-            self.problems.append(sentence)
+__all__ = ["PluginManager", "PluginRecord"]
 
 
 class PluginManager:
@@ -71,16 +50,17 @@ class PluginManager:
     ) -> Callable[[], None]:
         """Add a plugin with the highest precedence; returns the function that takes it out again.
 
-        replaces: names of objects whose place this plugin's objects take. Unlike a discovered plugin, one that is
-        handed over by a program is refused at once, with InvalidInput, for anything that is wrong with it.
+        plugin: a module, an object, or a class, which is called without arguments. replaces: names of objects whose
+        place this plugin's objects take. Unlike a discovered plugin, one that is handed over by a program is refused
+        at once, with InvalidInput, for anything that is wrong with it.
         """
         name = name or _name_of(plugin)
         if name in self._records:
             raise InvalidInput(f"a plugin named {name!r} is registered already ({self._records[name].source}).")
-        record = PluginRecord(name, "session", "this session", plugin, tuple(replaces))
-        self._admit(record)
+        record = PluginRecord(name, "session", "this session", replaces=tuple(replaces))
+        self._admit(record, lambda: plugin)
         for slot in SLOTS:
-            if hasattr(plugin, slot.hook):
+            if record.plugin is not None and hasattr(record.plugin, slot.hook):
                 self.offers(slot)
         if record.problems:
             self._remove(name)
@@ -98,12 +78,25 @@ class PluginManager:
         offers = self.offers(slot)
         if name in offers:
             return offers[name]
-        near = difflib.get_close_matches(name, offers, n=3) or sorted(offers)
-        failed = [record.name for record in self._records.values() if record.problems]
+        near = difflib.get_close_matches(name, offers, n=3)
+        near += sorted(other for other in offers if other not in near)  # all of them, the likeliest first
+        records = self._records.values()
+        absent = [told for record in records for told in record.absent if told.startswith(f"{slot.noun} ")]
+        failed = [record.name for record in records if record.problems]
         raise InvalidInput(
             f"there is no {slot.noun} {name!r}; there are: {', '.join(near) or 'none'}."
+            + (f" Not available here: {' '.join(absent)}" if absent else "")
             + (f" Plugins with problems (see `contact plugins`): {', '.join(failed)}." if failed else "")
         )
+
+    def refuse(self, slot: Slot[Any], name: str, reason: str) -> None:
+        """Take an object out that proved unsound when it was used; the reason is a problem of its plugin."""
+        for record in self._records.values():
+            kept = [offer for offer in record.collected.get(slot.hook, ()) if offer.name != name]
+            if len(kept) < len(record.collected.get(slot.hook, ())):
+                record.collected[slot.hook] = kept
+                record.complain(f"its {slot.noun} {name!r} is refused: {reason}.")
+        self._filled.pop(slot.hook, None)
 
     def choose(self, hook: str, offered: Iterable[str], **arguments: Any) -> str | None:
         """Ask a `contact_choose_*` hook, highest precedence first; an answer that is not `offered` is noted."""
@@ -135,33 +128,30 @@ class PluginManager:
         name = candidate.name
         if name in self._records:
             name = f"{candidate.name} ({candidate.source})"
-        record = PluginRecord(name, candidate.origin, candidate.source)
-        try:
-            record.plugin = candidate.load()
-        except (Exception, SystemExit) as error:  # a module may do anything while it is imported
-            record.complain(f"cannot be imported: {_spell(error)}.")
-            self._records[name] = record
-            return
-        self._admit(record)
+        self._admit(PluginRecord(name, candidate.origin, candidate.source), candidate.load)
 
-    def _admit(self, record: PluginRecord) -> None:
-        """Register with pluggy after the checks that pluggy leaves out."""
+    def _admit(self, record: PluginRecord, load: Callable[[], object]) -> None:
+        """Load a plugin and register it with pluggy after the checks that pluggy leaves out."""
         self._records[record.name] = record
         self._filled.clear()
-        refusal = api_refusal(record.plugin)
-        if refusal is None:
-            try:
-                if self._pluggy.register(record.plugin, record.name) is None:
-                    refusal = "is not a plugin: a module or object was wanted, but None came."
-            except (ValueError, pluggy.PluginValidationError) as error:
-                self._pluggy.unregister(name=record.name)  # older pluggy leaves half of it registered
-                refusal = " ".join(str(error).split()) + "."
-        if refusal:
-            record.complain(refusal)
-            record.plugin = None
-        else:
-            for sentence in hook_mistakes(record.plugin):
-                record.complain(sentence)
+        with record.bearing("cannot be imported:"):  # a module may do anything while it is imported
+            plugin = load()
+            plugin = plugin() if isinstance(plugin, type) else plugin
+            with record.bearing("cannot be looked at:"):  # and an object while its members are read
+                refusal = api_refusal(plugin) or self._register(plugin, record.name)
+                for sentence in [refusal] if refusal else hook_mistakes(plugin):
+                    record.complain(sentence)
+                record.plugin = None if refusal else plugin
+        if record.plugin is None and self._pluggy.has_plugin(record.name):
+            self._pluggy.unregister(name=record.name)  # older pluggy leaves half of it registered
+
+    def _register(self, plugin: object, name: str) -> str | None:
+        """Why pluggy refuses a plugin; None where it does not."""
+        try:
+            known = self._pluggy.register(plugin, name)
+        except (ValueError, pluggy.PluginValidationError) as error:
+            return " ".join(str(error).split()) + "."
+        return "is not a plugin: a module or object was wanted, but None came." if known is None else None
 
     def _remove(self, name: str) -> None:
         if self._records.pop(name, None) is not None:
@@ -174,44 +164,31 @@ class PluginManager:
         caller = getattr(self._pluggy.hook, hook)
         for implementation in caller.get_hookimpls():
             if implementation.plugin_name == record.name and not is_wrapper(implementation.opts):
-                try:
+                with record.bearing(f"its hook {hook} raised", f"{hook}: "):
                     return implementation.function(*(arguments[name] for name in implementation.argnames))
-                except (Exception, SystemExit) as error:
-                    record.complain(f"its hook {hook} raised {_spell(error)}.")
         return None
 
-    def _collect(self, record: PluginRecord, slot: Slot[Any]) -> list[Any]:
+    def _collect(self, record: PluginRecord, slot: Slot[Any]) -> list[Offer]:
         """The sound objects that one plugin offers for a slot; each unsound one is written down."""
         answer = self._call(record, slot.hook, {})
-        sound: list[Any] = []
+        sound: list[Offer] = []
         if answer is None:
             return sound
-        try:
-            iterator = iter(answer)
-        except TypeError:
-            record.complain(f"its hook {slot.hook} must return an iterable, but returned {type(answer).__name__}.")
+        if isinstance(answer, str) or not isinstance(answer, Iterable):
+            record.complain(
+                f"its hook {slot.hook} must return an iterable, but returned {type(answer).__name__};"
+                " put it in a list."
+            )
             return sound
-        while True:  # a generator may raise half-way: what came before stays
-            try:
-                offered = next(iterator)
-            except StopIteration:
-                return sound
-            except (Exception, SystemExit) as error:
-                record.complain(f"its hook {slot.hook} raised {_spell(error)}.")
-                return sound
-            try:
-                made = _made(offered, slot)
-                lacks = shortcomings(made, slot)
-            except MissingExtra as error:
-                record.absent.append(f"{slot.noun} {_reference(offered)}: {error}")
-                continue
-            except (Exception, SystemExit) as error:
-                record.complain(f"its {slot.noun} {_reference(offered)} cannot be made: {_spell(error)}.")
-                continue
-            if lacks:
-                record.complain(f"its {slot.noun} {_reference(offered)} is refused: {'; '.join(lacks)}.")
-            else:
-                sound.append(made)
+        with record.bearing(f"its hook {slot.hook} raised", f"{slot.noun} "):  # half-way: what came before stays
+            for count, offered in enumerate(answer):
+                if count == MOST_OFFERS:
+                    record.complain(
+                        f"its hook {slot.hook} goes on after {MOST_OFFERS} offers; the others are left out."
+                    )
+                    break
+                sound += _examined(record, slot, offered)
+        return sound
 
     def _fill(self, slot: Slot[Any]) -> dict[str, Any]:
         """Objects by name over all plugins, lowest precedence first, duplicates refused unless they replace."""
@@ -221,9 +198,8 @@ class PluginManager:
             if slot.hook not in record.collected:
                 record.collected[slot.hook] = self._collect(record, slot)
             record.offers.pop(slot.noun, None)
-            for made in record.collected[slot.hook]:
-                name = getattr(made, slot.key)
-                replaced = {*_words(getattr(made, "replaces", ())), *record.replaces} & filled.keys()
+            for name, made, replaces in record.collected[slot.hook]:
+                replaced = {*replaces, *record.replaces} & filled.keys()
                 if name in filled and name not in replaced:
                     record.complain(
                         f"its {slot.noun} {name!r} is refused: the plugin {owner[name].name!r}"
@@ -231,10 +207,35 @@ class PluginManager:
                         f' rename it, or set replaces = "{name}" on it.'
                     )
                     continue
+                for nobody in set(replaces) - filled.keys() - {name}:
+                    self._miss(record, slot, name, nobody, filled)
                 for key in {name, *replaced}:
                     filled[key], owner[key] = made, record
                 record.offers.setdefault(slot.noun, []).append(name)
         return filled
+
+    def _miss(self, record: PluginRecord, slot: Slot[Any], name: str, nobody: str, filled: Iterable[str]) -> None:
+        """Complain of `replaces` that names nothing; not where its library may be what is missing here."""
+        if not any(told.startswith(f"{slot.noun} ") for each in self._records.values() for told in each.absent):
+            near = difflib.get_close_matches(nobody, filled, n=1)
+            record.complain(
+                f"its {slot.noun} {name!r} replaces {nobody!r}, which no plugin before it offers"
+                + (f"; did you mean {near[0]!r}?" if near else ".")
+            )
+
+
+def _examined(record: PluginRecord, slot: Slot[Any], offered: Any) -> list[Offer]:
+    """What is behind an offer, in a list; none where it is unsound, which is written down."""
+    label = offered if isinstance(offered, str) else repr(_type_of(offered).__qualname__)
+    with record.bearing(f"its {slot.noun} {label} cannot be made:", f"{slot.noun} {label}: "):
+        made = _made(offered, slot)
+        lacks = shortcomings(made, slot)
+        if not lacks:
+            replaces = getattr(made, "replaces", ())
+            words = (replaces,) if isinstance(replaces, str) else tuple(replaces)
+            return [Offer(getattr(made, slot.key), made, words)]
+        record.complain(f"its {slot.noun} {label} is refused: {'; '.join(lacks)}.")
+    return []
 
 
 def _made(offered: Any, slot: Slot[Any]) -> Any:
@@ -243,21 +244,10 @@ def _made(offered: Any, slot: Slot[Any]) -> Any:
     return found() if slot.instances and isinstance(found, type) else found
 
 
-def _reference(offered: Any) -> str:
-    if isinstance(offered, str):
-        return offered
-    return repr(getattr(offered, "__qualname__", type(offered).__qualname__))
-
-
-def _words(value: Any) -> tuple[str, ...]:
-    return (value,) if isinstance(value, str) else tuple(value)
+def _type_of(offered: Any) -> type:
+    return offered if isinstance(offered, type) else type(offered)
 
 
 def _name_of(plugin: object) -> str:
     name = getattr(plugin, "__name__", None)
     return name if isinstance(name, str) else type(plugin).__name__
-
-
-def _spell(error: BaseException) -> str:
-    """One line: the kind of the error and what it said."""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}".rstrip(": .")

@@ -66,8 +66,8 @@ class SolveOptions:
     more: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        unknown = set(self.candidates) - {"current", "positions", "normals"}
-        if unknown or not self.candidates:
+        known = ("current", "positions", "normals")
+        if not self.candidates or any(candidate not in known for candidate in self.candidates):
             raise InvalidInput(
                 "candidates are some of current, positions, normals, at least one, but got"
                 f" {list(self.candidates)}."
@@ -83,7 +83,10 @@ class SolveOptions:
         unknown = sorted(set(self.more) - set(known))
         if unknown:
             listed = ", ".join(known) or "none"
-            raise InvalidInput(f"{solver} has no setting {unknown[0]!r}; its settings: {listed}.")
+            raise InvalidInput(
+                f"{solver} has no setting {unknown[0]!r}; its settings: {listed}."
+                " Every solver knows max_iterations, tolerance, candidates and seed."
+            )
 
 
 @runtime_checkable

@@ -128,3 +128,13 @@ def test_the_allegro_hand(assets: Path) -> None:
     assert all(freedom.lower[0] < 0 < freedom.upper[0] for freedom in hinges)
     assert any("joint_12.0" in note for note in asset.notes)
     assert 0.2 < asset.mesh.bounding_box_diagonal < 0.5
+
+
+@pytest.mark.parametrize("text", ["", "no XML at all", "\0" * 50, "<robot name='x'>"])
+def test_what_is_no_xml_is_one_sentence_and_nothing_else_is_printed(
+    text: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "r.urdf").write_text(text)
+    with pytest.raises(FileRefused, match=r"was to be a URDF file, but cannot be parsed: .* Check its XML"):
+        UrdfFiles().read(tmp_path / "r.urdf")
+    assert capfd.readouterr() == ("", "") and not caplog.records

@@ -25,7 +25,7 @@ class Demo:
             titles = {name: demo_recipe(name).title for name in demo_names()}
             arguments.output.answer(titles, "\n".join(f"{name:<12} {title}" for name, title in titles.items()))
             return 0
-        name = arguments.demo or DEFAULT
+        name = DEFAULT if arguments.demo is None else arguments.demo
         out = arguments.out or Path("contact-demo") / name
         result = run_demo(name, out, plugins=arguments.plugins, progress=arguments.output.progress)
         tell(result, arguments.output)

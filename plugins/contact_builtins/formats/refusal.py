@@ -36,8 +36,18 @@ def refusing(path: Path, what: str) -> Iterator[None]:
     except OSError as error:
         raise FileRefused(f"{path} cannot be read: {error.strerror or error}.") from error
     except DAMAGE as error:
-        reason = str(error).strip().rstrip(".") or type(error).__name__
+        reason = _in_words(error)
         raise FileRefused(f"{path} was to be {what}, but is damaged: {reason[:300]}. Export it anew.") from error
+
+
+def _in_words(error: Exception) -> str:
+    """What our own checks say is a sentence already; what Python says of a file's wrong values becomes one."""
+    reason = str(error).strip().rstrip(".") or type(error).__name__
+    if isinstance(error, KeyError):
+        return f"{reason} is missing, or no word that the format knows"
+    if isinstance(error, TypeError | AttributeError):
+        return f"a value is of the wrong kind ({reason})"
+    return "a number in it is too large" if isinstance(error, OverflowError) else reason
 
 
 def file_bytes(path: Path) -> bytes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -14,6 +13,7 @@ import numpy as np
 from contact_builtins.formats.refusal import file_bytes
 from contact_core.arrays import FloatArray
 from contact_core.errors import FileRefused, InvalidInput
+from contact_core.job.table import parse_toml
 from contact_core.pose.rig import ROTATION_DOFS, JointFreedom
 
 SCHEMA = 1
@@ -81,9 +81,11 @@ def sidecar_beside(path: Path) -> Path | None:
 def read_sidecar(path: Path) -> Sidecar:
     """Parse and check a rig.toml. Raises FileRefused with the key that is wrong."""
     try:
-        table = tomllib.loads(file_bytes(path).decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FileRefused(f"{path} is not TOML: {error}.") from error
+        table = parse_toml(file_bytes(path).decode(), str(path))
+    except UnicodeDecodeError as error:
+        raise FileRefused(f"{path} is not TOML: it is not UTF-8 text.") from error
+    except InvalidInput as error:
+        raise FileRefused(str(error)) from error
     if table.get("schema") != SCHEMA:
         raise FileRefused(f"{path} needs the line `schema = {SCHEMA}` first; {table.get('schema')!r} came.")
     _known(path, table, TOP_KEYS, "the top level")

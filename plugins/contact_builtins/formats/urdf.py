@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -66,9 +67,11 @@ def _parse(path: Path) -> Any:
         import yourdfpy
     except ImportError as error:
         raise MissingExtra("Reading URDF", "io") from error
-    if b"<!DOCTYPE" in file_bytes(path) or b"<!ENTITY" in file_bytes(path):  # no entities: they name other files
+    text = file_bytes(path)
+    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:  # no entities: they name other files
         raise FileRefused(f"{path} declares a document type, which no URDF needs and which is not read. Remove it.")
     try:
+        ElementTree.fromstring(text)  # of what is no XML yourdfpy tells stderr before it raises
         return yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False).robot
     except Exception as error:  # yourdfpy and lxml raise whatever they meet
         reason = " ".join(str(error).split())[:200] or type(error).__name__

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from types import ModuleType
 
@@ -205,3 +207,53 @@ def test_samples_are_listed_and_written(tmp_path: Path, capsys: pytest.CaptureFi
 def test_columns_align_and_the_last_runs_free() -> None:
     assert columns([("a", "bb", "long text"), ("ccc", "d", "x")]) == "a    bb  long text\nccc  d   x"
     assert columns([]) == ""
+
+
+def run_contact(arguments: list[str], **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "contact_core.cli", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="surrogateescape",
+        env={**os.environ, **environment},
+    )
+
+
+def test_whoever_closes_the_pipe_early_hears_no_complaint() -> None:
+    """`contact plugins | true`."""
+    process = run_contact(["plugins", "--json"])
+    assert process.stdout is not None and process.stderr is not None
+    process.stdout.close()
+    assert process.stderr.read() == "" and process.wait() == 141
+
+
+@pytest.mark.parametrize("as_json", [[], ["--json"]])
+def test_a_terminal_without_umlauts_gets_them_spelt_out(as_json: list[str], tmp_path: Path) -> None:
+    process = run_contact(
+        ["new-plugin", "studio-a", "--in", str(tmp_path / "b\u00fc\u624b"), *as_json], PYTHONIOENCODING="ascii"
+    )
+    out, err = process.communicate()
+    assert process.returncode == 0 and err == "" and "b\\u00fc\\u624b" in out.replace("\\xfc", "\\u00fc")
+    if as_json:
+        assert json.loads(out)["written"] == str(tmp_path / "b\u00fc\u624b" / "studio-a")
+
+
+class Careless(Shout):
+    name = "careless"
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        warnings.warn("invalid value encountered in divide", RuntimeWarning, stacklevel=1)
+        if arguments.word == "memory":
+            raise MemoryError
+        raise InvalidInput("two\nlines,\nand no more.")
+
+
+def test_libraries_do_not_mumble_between_a_command_and_its_error(capsys: pytest.CaptureFixture[str]) -> None:
+    module = ModuleType("careless")
+    module.contact_cli = hookimpl(lambda: [Careless])  # type: ignore[attr-defined]
+    plugins = PluginManager([module], discover=False)
+    assert main(["careless", ""], plugins=plugins) == 2
+    assert capsys.readouterr() == ("", "contact: two lines, and no more.\n")
+    assert main(["careless", "memory"], plugins=plugins) == 2
+    assert capsys.readouterr().err.startswith("contact: the memory of this machine does not suffice")

@@ -15,6 +15,7 @@ from contact_builtins.demos import demo_names, demo_recipe
 from contact_core.document.schema import parse_document
 from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInput
 from contact_core.job.assets import convex_hull
+from contact_core.job.outputs import write_outputs
 from contact_core.job.painting import paint
 from contact_core.job.recipe import AssetSource, PatchSpec, PointSpec, Recipe, RootSpec
 from contact_core.job.run import perform, run, target
@@ -214,6 +215,19 @@ REFUSALS: dict[str, tuple[Any, str]] = {
     "too many angles": (
         lambda r: replace(r, coarse=replace(r.coarse, pose={"thumb_tip": (3.0, 2.0)})), "has 0 angles, but 2 came"
     ),
+    "an object of another unit": (
+        lambda r: replace(r, object=replace(r.object, scale=1e-9)), "across; mend object.scale, or the units"
+    ),
+    "a disk larger than the hand": (
+        lambda r: _patched(r, disk=replace(r.patches[0].disk, radius=1e9)), "radius is 1e.09, but .* units across"
+    ),
+    "a direction into the object": (
+        lambda r: _patched(r, place=RootSpec(PointSpec(position=(1.0, 0.6, 0.0)), direction=(1.0, 0.0, 0.0))),
+        "stands upright on the object",
+    ),
+    "settings that a generator has not": (
+        lambda r: _patched(r, generator_options={"bend": 3}), "has no settings, but 'bend' came"
+    ),
     "nothing near": (
         lambda r: replace(r, placer_options={**r.placer_options, "far": 1e-9}), "the hand is not near the object"
     ),
@@ -230,6 +244,63 @@ def test_what_cannot_be_done_is_a_sentence(case: str, tmp_path: Path) -> None:
     with pytest.raises(ContactError, match=says):
         run(change(demo_recipe("alien")), tmp_path / "out", plugins=plugins())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("mine")
+    (tmp_path / "out" / "report.json").mkdir(parents=True)
+    told: list[str] = []
+    for out, says in (("taken", "is not a folder"), ("taken/below", "is not a folder"), ("out", "it is a folder")):
+        with pytest.raises(FileRefused, match=says):
+            run(demo_recipe("alien"), tmp_path / out, plugins=plugins(), progress=lambda _, text: told.append(text))
+    assert not told and (tmp_path / "taken").read_text() == "mine"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["report.json"]
+
+
+class Late(Sketch):
+    """A renderer in whose time something happens that nobody expects."""
+
+    def __init__(self, event: BaseException) -> None:
+        super().__init__()
+        self.event = event
+
+    def render(self, pictures: Any, path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
+        raise self.event
+
+
+@pytest.mark.parametrize("event", [KeyboardInterrupt(), OSError(28, "No space left on device"), MemoryError()])
+def test_what_ends_a_job_while_it_writes_leaves_the_old_results_whole(event: BaseException, tmp_path: Path) -> None:
+    run(demo_recipe("alien"), tmp_path / "out", plugins=with_renderers(Sketch()))
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    for place in ("out", "new"):
+        with pytest.raises((type(event), FileRefused)):
+            run(demo_recipe("pole"), tmp_path / place, plugins=with_renderers(Late(event)))
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_picture_of_an_earlier_run_does_not_stay_beside_a_report_without_one(tmp_path: Path) -> None:
+    run(demo_recipe("alien"), tmp_path, plugins=with_renderers(Sketch()))
+    assert (tmp_path / "picture.png").exists()
+    (tmp_path / "notes.txt").write_text("mine")
+    nothing_draws_or_exports = PluginManager([Plugin(Broken())], discover=False)
+    result = write_outputs(demo("alien"), tmp_path, nothing_draws_or_exports)
+    assert set(result.files) == {"document", "pose", "report"}
+    assert {path.name for path in tmp_path.iterdir()} == {"document.json", "pose.json", "report.json", "notes.txt"}
+
+
+def test_a_report_is_json_whatever_was_measured(tmp_path: Path) -> None:
+    job = perform(demo_recipe("alien"), plugins())
+    job.metrics = {**job.metrics, "gap": float("nan")}
+    job.seconds["solve"] = float("inf")
+    write_outputs(job, tmp_path, with_renderers(Sketch()))
+    text = (tmp_path / "report.json").read_text()
+    report = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert (
+        report["gap"] is None
+        and report["seconds"]["solve"] is None
+        and report["contacts"] == job.metrics["contacts"]
+    )
 
 
 def test_settling_moves_contacts_and_never_happens_unasked() -> None:

@@ -83,6 +83,18 @@ MISTAKES = {
     "points twice": ("vertices = [1, 2, 3]", "vertices = [1, 2, 3]\npositions = [[0,0,0]]", r"exactly one of 'vertices', 'positions', 'disk'"),
     "a fraction as a vertex": ("vertices = [1, 2, 3]", "vertices = [1.5]", r"a list of whole numbers"),
     "too many angles": ('"thumb-1" = 20', '"thumb-1" = [1,2,3,4]', r"one to three angles"),
+    "no vertex": ("vertices = [1, 2, 3]", "vertices = []", r"vertices holds no point"),
+    "a number that overflows": ("radius = 0.007", "radius = " + "9" * 400, r"disk.radius must be a number above 0, but 9+... came"),
+    "a number that overflows when squared": ("object_center = [0,", "object_center = [1e300,", r"object_center must be three numbers"),
+    "a number beyond Python's own": ("radius = 0.007", "radius = " + "9" * 5000, r"holds a number of more digits"),
+    "such a number in base 16": ("radius = 0.007", "radius = 0x" + "f" * 5000, r"disk.radius must be .* but a number without end came"),
+    "a vertex beyond the machine's numbers": ("vertices = [1, 2, 3]", f"vertices = [{2**63}]", r"a list of whole numbers"),
+    "a direction that vanishes when squared": ("approach = [1, 0, 0]", 'approach = [1, 0, 0]\n[view]\nup = [0, 1e-200, 0]', r"view.up must be three numbers, not all zero"),
+    "a sidecar of a sample": ('file = "hand.glb"\nsha256 = "BC677831449400000000000000000000000000000000000000000000000000ff"', 'sample = "human_hand"', r"rig goes with a file; the sample 'human_hand' has its own limits"),
+    "half an iteration": ("[accept]", "[solve]\noptions = { max_iterations = 2.5 }\n[accept]", r"options.max_iterations must be a whole number"),
+    "a tolerance of words": ("[accept]", '[solve]\noptions = { tolerance = "small" }\n[accept]', r"options.tolerance must be a number"),
+    "a seed that is none": ("[accept]", "[solve]\noptions = { seed = -1 }\n[accept]", r"options.seed must be a whole number"),
+    "candidates that are no words": ("[accept]", "[solve]\noptions = { candidates = [[1]] }\n[accept]", r"options.candidates must be a list of texts"),
     "not TOML": ("[accept]", "[accept", r"is not TOML"),
 }  # fmt: skip
 
@@ -107,3 +119,15 @@ def test_files_that_are_no_recipes(tmp_path: Path) -> None:
     large.write_bytes(b"#" * 5_000_000)
     with pytest.raises(FileRefused, match="too large"):
         load_recipe(large)
+
+
+def test_a_byte_order_mark_and_windows_line_ends_change_nothing() -> None:
+    assert parse_recipe("\ufeff" + GOOD.replace("\n", "\r\n"), name="ball.toml") == parse_recipe(
+        GOOD, name="ball.toml"
+    )
+
+
+def test_settings_of_a_solver_of_its_own_pass_through() -> None:
+    asked = '[solve]\noptions = { max_iterations = 3, candidates = "current", algorithm = "LD_MMA" }\n[accept]'
+    options = parse_recipe(GOOD.replace("[accept]", asked), name="ball.toml").solve.options
+    assert options == {"max_iterations": 3, "candidates": ("current",), "algorithm": "LD_MMA"}

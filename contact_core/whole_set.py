@@ -1,0 +1,77 @@
+"""Files that belong together: a folder gets all of a new set or keeps all of the old one."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from contact_core.errors import FileRefused
+
+
+@contextlib.contextmanager
+def replacing_together(folder: Path, names: Collection[str]) -> Iterator[Path]:
+    """An empty folder inside `folder`; once it is filled without an error, its files have replaced those there.
+
+    names: of all files of the set. The old ones stay as they are until the last of the new is on the disk; one
+    that the new set lacks (a picture that nothing could draw) is gone afterwards. Whoever publishes at the same
+    moment waits, so that two sets never mix. Raises FileRefused.
+    """
+    check_writable(folder, names)
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        stage = Path(tempfile.mkdtemp(prefix=".contact-", dir=folder))
+    except OSError as error:
+        raise FileRefused(f"cannot write into {folder}: {error.strerror or error}.") from error
+    try:
+        yield stage
+        with _alone(folder):
+            written = sorted(path.name for path in stage.iterdir())
+            for name in written:
+                (stage / name).replace(folder / name)
+            for name in set(names) - set(written):  # what an earlier run left would not belong to this set
+                (folder / name).unlink(missing_ok=True)
+    except FileRefused as error:  # in the words of the folder that was asked for
+        raise FileRefused(str(error).replace(str(stage), str(folder))) from error
+    except OSError as error:
+        raise FileRefused(
+            f"cannot write into {folder}: {error.strerror or error}. What was there before is untouched."
+        ) from error
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+        with contextlib.suppress(OSError):  # what was made for nothing goes; a folder that holds anything stays
+            for place in made:
+                place.rmdir()
+
+
+def check_writable(folder: Path, names: Collection[str]) -> None:
+    """Raises FileRefused when `names` cannot be written into `folder`: told before the work, not after it."""
+    there = next(place for place in (folder, *folder.absolute().parents) if os.path.lexists(place))
+    if not there.is_dir():
+        raise FileRefused(f"cannot write into {folder}: {there} is not a folder. Name another folder.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FileRefused(f"cannot write into {folder}: {there} is read-only for you. Name another folder.")
+    for name in names:
+        if (folder / name).is_dir():
+            raise FileRefused(f"cannot write {folder / name}: it is a folder. Name another folder, or remove it.")
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """While this holds, nobody else is in here with the same folder, where the system can lock folders (POSIX)."""
+    try:
+        import fcntl
+    except ImportError:  # Windows: each file is still whole
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # some network drives know no locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
