@@ -73,9 +73,10 @@ class ProgressiveSolver:
 
 
 class MultiStartSolver:
-    """Many seeded starts: the candidates first, then random placements and poses within the limits.
+    """Many seeded starts: the pose as it is, then random placements and poses anywhere within the limits.
 
-    Setting `starts`: how many (32 by default), each with the iterations of `max_iterations`.
+    Two of three are then brought to their contacts by a rigid fit, with normals and without; the third stays where
+    it fell. Setting `starts`: how many (32 by default), each with the iterations of `max_iterations`.
     """
 
     name = "multi-start"
@@ -100,8 +101,8 @@ class MultiStartSolver:
         try:
             for number in range(starts):
                 theta = problem.start if number == 0 else random_start(problem, random)
-                placed = fitted(problem, theta, with_normals=number % 2 == 0)
-                descent = Descent(run, theta if placed is None or number == 0 else placed, options.tolerance)
+                placed = fitted(problem, theta, with_normals=number % 3 == 1) if number % 3 else None
+                descent = Descent(run, theta if placed is None else placed, options.tolerance)
                 descent.advance(options.max_iterations)
                 if descent.value < best:
                     best = descent.value
@@ -138,10 +139,10 @@ def carrier_depths(problem: PoseProblem, contact: str) -> IntArray:
 
 
 def random_start(problem: PoseProblem, random: np.random.Generator) -> FloatArray:
-    """A theta (d,) with angles up to half a radian from the start within the limits, and a random placement."""
+    """A theta (d,): angles a random share of the way from the start to anywhere within the limits; placed about a
+    manipulator's length away, turned anyhow."""
     lower, upper = problem.limits_of_theta
-    theta = problem.start + random.uniform(-0.5, 0.5, len(problem.start))
-    theta = np.where(problem.is_root & ~problem.is_translation, random.uniform(-np.pi, np.pi, len(theta)), theta)
+    turn = random.uniform(np.maximum(lower, -np.pi), np.minimum(upper, np.pi))
+    theta = np.where(problem.is_root, turn, problem.start + random.uniform() * (turn - problem.start))
     reach = problem.manipulator_length * random.normal(0.0, 1.0, len(theta))
-    theta = np.where(problem.is_translation, problem.start + reach, theta)
-    return np.clip(theta, lower, upper)
+    return np.clip(np.where(problem.is_translation, problem.start + reach, theta), lower, upper)
