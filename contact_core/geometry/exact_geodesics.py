@@ -89,6 +89,7 @@ def log_map(
     is not.
     """
     from contact_core.geometry import log_map_kernels as kernels
+    from contact_core.geometry.way_kernels import read_chains, read_targets
 
     limit = _limit(max_distance)
     if not len(sources):
@@ -99,7 +100,7 @@ def log_map(
     count = len(targets)
     anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
     distance, headings = np.empty(count), np.empty(count, np.complex128)
-    target_floats, target_integers = np.empty((count, 12)), np.empty((count, 6), np.int64)
+    target_floats, target_integers = np.empty((count, 12)), np.empty((count, 7), np.int64)
     tail, twin, shape = topology.tail, topology.twin, topology.shape
     first, angle_sum, kind = topology.first, topology.angle_sum, topology.kind
     with Workspace.lent(mesh) as work:
@@ -117,13 +118,14 @@ def log_map(
             raise topology.refuse_halfedge(element, "a log map")
         if status == kernels.MET_BLOCKED_VERTEX:
             raise topology.refuse_vertex(element, "a log map")
-        bends = kernels.read_targets(
-            limit, work.epoch, tail, twin, shape, angle_sum, kind, work.reach, work.leg, work.origin,
-            target_floats, target_integers, anchor, distance, headings.view(np.float64).reshape(-1, 2), offsets,
+        bends = read_targets(
+            limit, work.epoch, tail, twin, shape, first, angle_sum, kind, work.reach, work.leg, work.origin,
+            target_floats, target_integers, _NO_FACES, _NO_BARYCENTRIC,
+            anchor, distance, headings.view(np.float64).reshape(-1, 2), offsets,
         )  # fmt: skip
         first_leg = np.empty(count, np.complex128)
         turning_angles, lengths = np.empty(bends), np.empty(bends)
-        kernels.read_chains(
+        read_chains(
             sources.faces, sources.barycentric, tail, twin, shape, angle_sum, kind, work.leg, work.origin,
             target_floats, target_integers, anchor, offsets,
             first_leg.view(np.float64).reshape(-1, 2), turning_angles, lengths,
@@ -160,6 +162,10 @@ def parallel_transport(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoi
     Source: Sharp, Soliman and Crane 2019, section 5.2: angles to the geodesic stay. Raises as exact_geodesic.
     """
     return exact_geodesic(mesh, start, end).transport(vectors)
+
+
+_NO_FACES: IntArray = np.empty(0, np.int64)  # no polyline is wanted
+_NO_BARYCENTRIC: FloatArray = np.empty((0, 3))
 
 
 def _limit(max_distance: float | None) -> float:

@@ -1,4 +1,4 @@
-"""The query of the log map: sources light their faces, windows spread, targets listen; then ways are read off.
+"""The query of the log map: sources light their faces, windows spread, targets listen.
 
 Targets inside faces and on edges wait in a list of one face: every window that enters it tests them, and at the end
 the three corners of the face are candidates too. Targets on vertices read the vertex.
@@ -24,13 +24,9 @@ from contact_core.geometry.tangent_kernels import (
     ON_FACE,
     ON_NOTHING,
     ON_VERTEX,
-    PI,
-    angle_round_vertex,
     direction_of_next,
-    heading_at,
     norm,
     place,
-    vertex_scale,
 )
 from contact_core.geometry.topology_kernels import (
     BLOCKED,
@@ -46,15 +42,14 @@ from contact_core.geometry.window_kernels import (
     HALFEDGE,
     MOST_SLACK,
     ROOT,
-    SHORTER_LEG,
     SIGMA,
     SIN,
     SLACK,
     SURELY,
     SX,
     SY,
+    TOUCHING,
     WEDGE,
-    bends_paths,
     distance_at,
     emit_shadow,
     emit_source,
@@ -67,9 +62,9 @@ DONE, MET_BLOCKED_EDGE, MET_BLOCKED_VERTEX, NO_ROOM = constant(0), constant(1), 
 X, Y, RANK, DISTANCE, ZX, ZY, DX, DY = (
     constant(0), constant(1), constant(6), constant(7), constant(8), constant(9), constant(10), constant(11),
 )  # fmt: skip
-# Columns of target_integers (t, 6)
-ON, ELEMENT, NEXT, TARGET_ROOT, TARGET_WEDGE, ARRIVAL = (
-    constant(0), constant(1), constant(2), constant(3), constant(4), constant(5),
+# Columns of target_integers (t, 7)
+ON, ELEMENT, NEXT, TARGET_ROOT, TARGET_WEDGE, ARRIVAL, TOUCHES = (
+    constant(0), constant(1), constant(2), constant(3), constant(4), constant(5), constant(6),
 )  # fmt: skip
 
 # A way that only grazes its window is preferred to another one if it is shorter by more than this: it may in truth
@@ -114,21 +109,18 @@ def list_targets(
 @inlined
 def offer(
     t: int, rank: float, distance: float, root: int, wedge: int, zx: float, zy: float, h: int, dx: float, dy: float,
-    target_floats: FloatArray, target_integers: IntArray,
+    touches: bool, target_floats: FloatArray, target_integers: IntArray,
 ) -> None:  # fmt: skip
-    """Give target t a way that is better than the one it has; direction (dx, dy) in the frame of h.
+    """Give target t a way if it is shorter than the one it has; direction (dx, dy) in the frame of h.
 
-    Of two ways of one length the better has the shorter last leg: where a straight way passes a saddle, the way
-    that bends there is as long, and only that one can be walked, for a walk parts the angles at a vertex.
+    touches: whether it touches the rim of its window.
     """
     row = target_floats[t]
-    if rank > row[RANK] * SURELY and (
-        rank * SURELY > row[RANK] or norm(zx, zy) >= norm(row[ZX], row[ZY]) * SHORTER_LEG
-    ):
+    if rank > row[RANK] * SURELY:
         return
     row[RANK], row[DISTANCE], row[ZX], row[ZY], row[DX], row[DY] = rank, distance, zx, zy, dx, dy
     target_integers[t, TARGET_ROOT], target_integers[t, TARGET_WEDGE] = root, wedge
-    target_integers[t, ARRIVAL] = h
+    target_integers[t, ARRIVAL], target_integers[t, TOUCHES] = h, 1 if touches else 0
 
 
 @inlined
@@ -144,25 +136,23 @@ def light_targets(
     record = floats[w]
     sx, sy = record[SX], record[SY]
     left_x, right_x = record[B0] - sx, record[B1] - sx
+    left_ray, right_ray = abs(left_x) - sy, abs(right_x) - sy
     blur = BLUR * (shape[3 * f, 0] + shape[3 * f + 1, 0] + shape[3 * f + 2, 0])
+    slack = min(max(record[SLACK], blur / min(left_ray, right_ray)), MOST_SLACK)
     t = int(listed[f, 1])
     while t >= 0:
         rx, ry = target_floats[t, X + 2 * k] - sx, target_floats[t, Y + 2 * k] - sy
         miss_left, miss_right = left_x * ry + sy * rx, -(right_x * ry + sy * rx)
-        if miss_left <= 0.0 and miss_right <= 0.0:
-            rank = 1.0
-        else:
-            span = abs(rx) + abs(ry)
-            left_ray, right_ray = abs(left_x) - sy, abs(right_x) - sy
-            slack = span * min(max(record[SLACK], blur / min(left_ray, right_ray)), MOST_SLACK)
-            grazes = miss_left <= slack * left_ray and miss_right <= slack * right_ray
-            rank = GRAZING_RANK if grazes else math.inf
-        if rank < math.inf:
+        lean = slack * (abs(rx) + abs(ry))
+        left_lean, right_lean = lean * left_ray, lean * right_ray
+        if miss_left <= left_lean and miss_right <= right_lean:
+            rank = 1.0 if miss_left <= 0.0 and miss_right <= 0.0 else GRAZING_RANK
+            touches = miss_left >= -TOUCHING * left_lean or miss_right >= -TOUCHING * right_lean
             distance = record[SIGMA] + norm(rx, ry)
             zx, zy = rx * record[COS] - ry * record[SIN], rx * record[SIN] + ry * record[COS]
             offer(
                 t, rank * distance, distance, integers[w, ROOT], integers[w, WEDGE], zx, zy, h, rx, ry,
-                target_floats, target_integers,
+                touches, target_floats, target_integers,
             )  # fmt: skip
         t = target_integers[t, NEXT]
 
@@ -207,7 +197,7 @@ def light_own_face(
     while t >= 0:
         rx, ry = target_floats[t, X + 2 * k] - x, target_floats[t, Y + 2 * k] - y
         distance = norm(rx, ry)
-        offer(t, distance, distance, root, base, rx, ry, base, rx, ry, target_floats, target_integers)
+        offer(t, distance, distance, root, base, rx, ry, base, rx, ry, False, target_floats, target_integers)
         t = target_integers[t, NEXT]
 
 
@@ -316,92 +306,3 @@ def search(
             next_check += patience
             bound = farthest_target(bound, epoch, tail, reach, target_floats, target_integers)
     return (NO_ROOM if state[OVERFLOW] > 0 else DONE), 0
-
-
-@kernel
-def read_targets(
-    limit: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray,
-    angle_sum: FloatArray, kind: IntArray, reach: FloatArray, leg: FloatArray, origin: IntArray,
-    target_floats: FloatArray, target_integers: IntArray,
-    anchor: IntArray, distance: FloatArray, headings: FloatArray, offsets: IntArray,
-) -> int:  # fmt: skip
-    """Settle the way of every target; write anchor, distance, headings (t, 2) and offsets of the chains (t + 1,).
-
-    Afterwards target_integers hold root and wedge, and target_floats ZX, ZY the last leg, for vertices too.
-    """
-    total = 0
-    for t in range(len(anchor)):
-        on, element = target_integers[t, ON], target_integers[t, ELEMENT]
-        row = target_floats[t]
-        headings[t, 0], headings[t, 1] = 1.0, 0.0
-        if on == ON_VERTEX:
-            distance[t] = distance_at(element, epoch, reach)
-            if distance[t] <= limit and distance[t] < math.inf:
-                row[ZX], row[ZY] = leg[element, 0], leg[element, 1]
-                target_integers[t, TARGET_ROOT] = origin[element, 0]
-                target_integers[t, TARGET_WEDGE] = origin[element, 1]
-                if distance[t] > 0.0:
-                    angle = leg[element, 2] * vertex_scale(element, angle_sum, kind)
-                    headings[t, 0], headings[t, 1] = -math.cos(angle), -math.sin(angle)
-        else:
-            base = 3 * host_face(t, target_integers)
-            for k in range(3):
-                x, y = row[X + 2 * k], row[Y + 2 * k]
-                way = distance_at(tail[base + k], epoch, reach)
-                if 0.0 < way < math.inf:
-                    way += norm(x, y)
-                    if way >= row[RANK] * SURELY and not bends_paths(tail[base + k], angle_sum, kind):
-                        continue  # straight on through a flat corner: the way is not cut in two there
-                    offer(
-                        t, way, way, tail[base + k], base + k, x, y, base + k, x, y, target_floats, target_integers
-                    )
-            distance[t] = row[DISTANCE] if row[RANK] < math.inf else math.inf
-            if 0.0 < distance[t] <= limit and distance[t] < math.inf:
-                headings[t, 0], headings[t, 1] = heading_at(
-                    on, element, target_integers[t, ARRIVAL], row[DX], row[DY], tail, twin, shape, angle_sum, kind
-                )
-        if distance[t] > limit or distance[t] == math.inf:
-            anchor[t], distance[t] = -1, math.inf
-        else:
-            root = target_integers[t, TARGET_ROOT]
-            while root >= 0:
-                total += 1
-                root = origin[root, 0]
-            anchor[t] = -1 - root
-        offsets[t + 1] = total
-    return total
-
-
-@kernel
-def read_chains(
-    source_faces: IntArray, source_barycentric: FloatArray,
-    tail: IntArray, twin: IntArray, shape: FloatArray, angle_sum: FloatArray, kind: IntArray,
-    leg: FloatArray, origin: IntArray, target_floats: FloatArray, target_integers: IntArray,
-    anchor: IntArray, offsets: IntArray,
-    first_legs: FloatArray, turning_angles: FloatArray, lengths: FloatArray,
-) -> None:  # fmt: skip
-    """Write first_legs (t, 2) in the sources' tangent frames, and the legs that follow, last leg last."""
-    for t in range(len(anchor)):
-        first_legs[t, 0], first_legs[t, 1] = 0.0, 0.0
-        if anchor[t] < 0:
-            continue
-        root, wedge = target_integers[t, TARGET_ROOT], target_integers[t, TARGET_WEDGE]
-        zx, zy = target_floats[t, ZX], target_floats[t, ZY]
-        i = offsets[t + 1]
-        while root >= 0:
-            i -= 1
-            away = angle_round_vertex(wedge, zx, zy, shape)
-            turn = (away - leg[root, 2]) * vertex_scale(root, angle_sum, kind) - PI
-            turning_angles[i] = turn + 2.0 * PI if turn <= -PI else turn
-            lengths[i] = norm(zx, zy)
-            zx, zy, wedge, root = leg[root, 0], leg[root, 1], origin[root, 1], origin[root, 0]
-        s = -1 - root
-        b0, b1, b2 = source_barycentric[s, 0], source_barycentric[s, 1], source_barycentric[s, 2]
-        on, element, _, _ = place(source_faces[s], b0, b1, b2, tail, twin, shape)
-        if on == ON_EDGE and wedge != element:
-            zx, zy = -zx, -zy
-        elif on == ON_VERTEX:
-            length = norm(zx, zy)
-            angle = angle_round_vertex(wedge, zx, zy, shape) * vertex_scale(element, angle_sum, kind)
-            zx, zy = length * math.cos(angle), length * math.sin(angle)
-        first_legs[t, 0], first_legs[t, 1] = zx, zy

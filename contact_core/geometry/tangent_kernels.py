@@ -11,7 +11,13 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, inlined, kernel
-from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, following, has_three_corners, preceding
+from contact_core.geometry.topology_kernels import (
+    BLOCKED_VERTEX,
+    BOUNDARY_VERTEX,
+    following,
+    has_three_corners,
+    preceding,
+)
 
 ON_FACE = constant(0)  # element: face; x, y in the frame of halfedge 3f
 ON_EDGE = constant(1)  # element: the lower-index halfedge; x along it, y = 0
@@ -21,6 +27,7 @@ ON_NOTHING = constant(3)  # in a face without three corners; element: its halfed
 # A point this near to an edge or a vertex, as a fraction of the longest edge of its face, lies on it. A distance,
 # not a barycentric coordinate: in a face a million times longer than high, that would be a million times off.
 SNAP = 1e-11
+EXCESS = 1e-11  # radians by which a vertex must exceed a flat one for paths to bend round it
 PI = math.pi
 
 
@@ -118,6 +125,14 @@ def angle_round_vertex(h: int, x: float, y: float, shape: FloatArray) -> float:
 def vertex_scale(v: int, angle_sum: FloatArray, kind: IntArray) -> float:
     """Factor from angles round a vertex to angles of its tangent frame."""
     return (PI if kind[v] == BOUNDARY_VERTEX else 2.0 * PI) / angle_sum[v]
+
+
+@inlined
+def bends_paths(v: int, angle_sum: FloatArray, kind: IntArray) -> bool:
+    """Whether shortest paths can bend round vertex v. A blocked vertex counts: it is refused when met."""
+    if kind[v] == BOUNDARY_VERTEX:
+        return angle_sum[v] > PI + EXCESS
+    return kind[v] == BLOCKED_VERTEX or angle_sum[v] > 2.0 * PI + EXCESS
 
 
 @inlined

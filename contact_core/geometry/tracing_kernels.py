@@ -19,6 +19,7 @@ from contact_core.geometry.tangent_kernels import (
     PI,
     SNAP,
     angle_round_vertex,
+    bends_paths,
     corner_at_angle,
     direction_of_next,
     heading_at,
@@ -41,7 +42,9 @@ MET_BLOCKED_EDGE = constant(1)
 MET_BLOCKED_VERTEX = constant(2)
 TOO_LONG = constant(3)  # more than MOST_CROSSINGS: a length that no one meant
 NO_ROOM = constant(4)  # the polyline buffer is full
+MET_BEND = constant(5)  # a walk that was to stop there met a vertex that bends paths
 MOST_CROSSINGS = constant(5_000_000)
+MEETING = 4.0 * SNAP
 GRAZE = 1e-12  # radians by which a direction may point out of a boundary and still run along it
 
 
@@ -118,6 +121,7 @@ def walk(
     y: float,
     zx: float,
     zy: float,
+    to_bend: bool,
     tail: IntArray,
     twin: IntArray,
     shape: FloatArray,
@@ -133,6 +137,8 @@ def walk(
     Crossings are appended to the line buffers from row line_end on, if these have rows. Returns (status; the
     halfedge in whose frame the walk ends, or the blocked element, or -1 if it could not leave its start; x, y;
     direction x, y; remaining length; line_end).
+    to_bend: stop at the first vertex that bends paths, met in a wider sense, so that no walk the other way meets
+    one more. Returns MET_BEND, the corner there and the direction back in its frame.
     """
     remaining = math.hypot(zx, zy)
     dx, dy = zx / remaining, zy / remaining
@@ -172,7 +178,7 @@ def walk(
             edge, ox = preceding(h), 0.0
             size = shape[edge, 0]
             ux, uy = ax / size, ay / size
-        near = SNAP * size
+        near = MEETING * size if to_bend else SNAP * size
         across = dx * uy - dy * ux
         if across == 0.0:  # along a face without area
             step, along = max((length - x) if dx > 0.0 else x, 0.0), 0.0
@@ -206,6 +212,8 @@ def walk(
                 corner = h
                 bx, by = -dx, -dy
             vertex = tail[corner]
+            if to_bend and bends_paths(vertex, angle_sum, kind):
+                return MET_BEND, corner, x, y, bx, by, remaining, line_end
             if kind[vertex] == BLOCKED_VERTEX:
                 return MET_BLOCKED_VERTEX, vertex, x, y, dx, dy, remaining, line_end
             angle = onward_angle(vertex, angle_round_vertex(corner, bx, by, shape), angle_sum, kind)
@@ -307,7 +315,7 @@ def trace(
         while True:
             if rest >= 1e-290:
                 status, h, x, y, dx, dy, rest, cursor = walk(
-                    on, element, x, y, hx * rest, hy * rest, tail, twin, shape, first, angle_sum, kind,
+                    on, element, x, y, hx * rest, hy * rest, False, tail, twin, shape, first, angle_sum, kind,
                     line_faces, line_barycentric, cursor,
                 )  # fmt: skip
                 if status != DONE:

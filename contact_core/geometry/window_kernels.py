@@ -26,6 +26,7 @@ from contact_core.geometry.tangent_kernels import (
     ON_VERTEX,
     PI,
     angle_round_vertex,
+    bends_paths,
     corner_angle,
     direction_in_face,
     direction_of_next,
@@ -33,7 +34,6 @@ from contact_core.geometry.tangent_kernels import (
 )
 from contact_core.geometry.topology_kernels import (
     BLOCKED,
-    BLOCKED_VERTEX,
     BOUNDARY,
     BOUNDARY_VERTEX,
     following,
@@ -51,14 +51,15 @@ B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING, SLACK = (
 HALFEDGE, ROOT, WEDGE, SIDE = constant(0), constant(1), constant(2), constant(3)
 ONLY_CHILD, LEFT_CHILD, RIGHT_CHILD = constant(0), constant(1), constant(2)
 
-EXCESS = 1e-11  # radians by which a vertex must exceed a flat one for paths to bend round it
 # A ray meets a vertex or a target that it misses by no more than its window's slack, in radians: GRAZING, or what
 # rounding by BLUR of the size of a face did where the interval was nearest to the root. (Rays part at vertices, and
 # every mesh with straight lines has other vertices behind them: without slack these would stay dark.)
 GRAZING = 1e-11
 BLUR = 4e-15
 MOST_SLACK = 1e-6
-SHORTER_LEG = 1.0 - 1e-9  # relative margin for "shorter" of last legs: they differ by an edge or more
+# A way so near to the rim of its window (in slacks) may meet a vertex when it is walked, for a walk meets what it
+# misses by SNAP, a thousand times more than the blur of a face. `way_kernels.bend_met` looks whether it does.
+TOUCHING = 1e3
 SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
 
 
@@ -68,40 +69,19 @@ def distance_at(v: int, epoch: float, reach: FloatArray) -> float:
     return reach[v, 1] if reach[v, 0] == epoch else math.inf
 
 
-@inlined
-def bends_paths(v: int, angle_sum: FloatArray, kind: IntArray) -> bool:
-    """Whether shortest paths can bend round vertex v. A blocked vertex counts: it is refused when met."""
-    if kind[v] == BOUNDARY_VERTEX:
-        return angle_sum[v] > PI + EXCESS
-    return kind[v] == BLOCKED_VERTEX or angle_sum[v] > 2.0 * PI + EXCESS
-
-
-@inlined
-def is_better(
-    v: int, distance: float, zx: float, zy: float, sharp: bool, epoch: float, reach: FloatArray, leg: FloatArray
-) -> bool:
-    """Whether a way to v with last leg (zx, zy) replaces the one found so far: it is shorter, or as long with a
-    shorter last leg (see `log_map_kernels.offer`)."""
-    so_far = distance_at(v, epoch, reach)
-    if distance < so_far * SURELY:
-        return True
-    if distance * SURELY > so_far or not sharp:
-        return False
-    return norm(zx, zy) < norm(leg[v, 0], leg[v, 1]) * SHORTER_LEG
-
-
 @kernel
 def lower(
     v: int, distance: float, root: int, wedge: int, zx: float, zy: float, corner: int, bx: float, by: float,
-    bound: float, epoch: float, shape: FloatArray, angle_sum: FloatArray, kind: IntArray,
+    touches: bool, bound: float, epoch: float, shape: FloatArray, angle_sum: FloatArray, kind: IntArray,
     reach: FloatArray, leg: FloatArray, origin: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
 ) -> None:  # fmt: skip
-    """Record a shorter way to v: last leg (zx, zy) in the wedge's frame, way back (bx, by) in the corner's."""
+    """Record a shorter way to v: last leg (zx, zy) in the wedge's frame, way back (bx, by) in the corner's, and
+    whether it touches the rim of its window."""
     if reach[v, 0] == epoch and origin[v, 2] == 1:  # a vertex that was a root already keeps its way
         return
     reach[v, 0], reach[v, 1] = epoch, distance
     leg[v, 0], leg[v, 1], leg[v, 2] = zx, zy, angle_round_vertex(corner, bx, by, shape)
-    origin[v, 0], origin[v, 1], origin[v, 2] = root, wedge, 0
+    origin[v, 0], origin[v, 1], origin[v, 2], origin[v, 3] = root, wedge, 0, 1 if touches else 0
     if distance <= bound and bends_paths(v, angle_sum, kind):
         heap_push(distance, -1 - v, keys, items, state)
 
@@ -187,15 +167,17 @@ def propagate(
         slack = min(blur / nearest_ray, MOST_SLACK)
     left, right = beyond_left <= 0.0, beyond_right <= 0.0
     split_distance, split_crossing = -1.0, 0.0
-    if beyond_left <= span * slack * left_ray and beyond_right <= span * slack * right_ray:
+    left_lean, right_lean = span * slack * left_ray, span * slack * right_ray
+    if beyond_left <= left_lean and beyond_right <= right_lean:
         apex = tail[to_left]
         distance = sigma + norm(rx, ry)
         sharp = left and right
-        if is_better(apex, distance, rx, ry, sharp, epoch, reach, leg):
+        if distance < distance_at(apex, epoch, reach) * SURELY:
             cx, cy = -ax / left_length, -ay / left_length
             lower(
                 apex, distance, root, wedge, rx * cos - ry * sin, rx * sin + ry * cos,
                 to_left, -rx * cx - ry * cy, -ry * cx + rx * cy,
+                beyond_left >= -TOUCHING * left_lean or beyond_right >= -TOUCHING * right_lean,
                 bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
             )  # fmt: skip
         if sharp:  # one angle, one split
@@ -276,7 +258,7 @@ def emit_shadow(
             arrival = backward if reversed_edge else opposite
             neighbour = tail[arrival]
             distance = sigma + (shape[backward, 0] if reversed_edge else shape[h, 0])
-            if is_better(neighbour, distance, x, y, True, epoch, reach, leg):
+            if distance < distance_at(neighbour, epoch, reach) * SURELY:
                 if reversed_edge:
                     bx, by = 1.0, 0.0
                 else:
@@ -285,7 +267,7 @@ def emit_shadow(
                     bx, by = -vx * ux - vy * uy, -vy * ux + vx * uy
                 lower(
                     neighbour, distance, v, h, x, y, arrival, bx, by,
-                    bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
+                    False, bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
                 )  # fmt: skip
         start = shape[h, 3]
         for part in range(2):
@@ -350,7 +332,7 @@ def emit_source(
         if distance < distance_at(v, epoch, reach):
             lower(
                 v, distance, root, base, corner_x - from_x, corner_y - from_y, h, x, y,
-                bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
+                False, bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
             )  # fmt: skip
         length = shape[h, 0]
         if side == 1 or on == ON_FACE or (side == 2 and on == ON_EDGE):

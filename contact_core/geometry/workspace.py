@@ -19,7 +19,8 @@ class Workspace:
     Nothing is cleared between queries: a row whose first entry is not the epoch of the query counts as empty. The
     arrays begin as untouched zero pages, so memory grows with the regions visited, not with the mesh.
 
-    reach: (n, 2) epoch, distance.  origin: (n, 3) root, wedge, 1 once the vertex is a root itself.
+    reach: (n, 2) epoch, distance.  origin: (n, 4) root, wedge, 1 once the vertex is a root itself, 1 where the
+    last leg touches the rim of its window.
     leg: (n, 3) last leg to the vertex in the root's wedge frame; angle round the vertex of the way back.
     claim: (3m, 5) per entered halfedge: epoch, distance to the apex, where the ray to the apex crosses, interval.
     listed: (m, 2) epoch, first target of the face.
@@ -31,7 +32,7 @@ class Workspace:
         self.epoch = 0.0
         self.reach: FloatArray = np.zeros((point_count, 2))
         self.leg: FloatArray = np.zeros((point_count, 3))
-        self.origin: IntArray = np.zeros((point_count, 3), np.int64)
+        self.origin: IntArray = np.zeros((point_count, 4), np.int64)
         self.claim: FloatArray = np.zeros((3 * face_count, 5))
         self.listed: FloatArray = np.zeros((face_count, 2))
         self.state: IntArray = np.zeros(7, np.int64)

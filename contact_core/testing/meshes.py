@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 
@@ -118,6 +118,37 @@ def sliver(ratio: float = 1000.0, resolution: int = 10) -> TriangleMesh:
     return TriangleMesh(points, grid_faces(len(y), len(x)))
 
 
+def lattice(size: int = 9, levels: int = 3, seed: int = 1) -> TriangleMesh:
+    """A sheet of whole heights 0 to levels - 1 over size^2 lattice points: straight ways pass vertices exactly,
+    and many ways are equally long."""
+    x, y = np.meshgrid(*2 * [np.arange(float(size))])
+    z = np.random.default_rng(seed).integers(0, levels, (size, size)).astype(float)
+    return TriangleMesh(np.stack([x, y, z], -1).reshape(-1, 3), grid_faces(size, size))
+
+
+def blocks(solid: BoolArray | None = None) -> TriangleMesh:
+    """The closed surface of unit cubes where solid (a, b, c) is true: right angles, flat vertices, exact ties.
+
+    Two cubes that touch in an edge or a vertex alone make it non-manifold. Without an argument, a ring with a step.
+    """
+    if solid is None:
+        solid = np.ones((4, 3, 2), bool)
+        solid[1:3, 1, :] = False
+        solid[3, :, 1] = False
+    filled = np.pad(solid, 1)
+    corners: list[IntArray] = []
+    for axis in range(3):
+        u, v, normal = np.eye(3, dtype=np.int64)[[(axis + 1) % 3, (axis + 2) % 3, axis]]
+        for side in (0, 1):
+            cubes = np.argwhere(filled & ~np.roll(filled, 1 - 2 * side, axis=axis)) + side * normal
+            square = cubes[:, None] + (np.array([0 * u, u, u + v, v]) if side else np.array([0 * u, v, u + v, u]))
+            odd = cubes.sum(axis=1) % 2 == 1
+            square[odd] = np.roll(square[odd], 1, axis=1)  # the diagonals alternate
+            corners += [square[:, [0, 1, 2]], square[:, [0, 2, 3]]]
+    points, faces = np.unique(np.concatenate(corners).reshape(-1, 3), axis=0, return_inverse=True)
+    return TriangleMesh(points.astype(float), faces.reshape(-1, 3))
+
+
 def subdivided(mesh: TriangleMesh) -> TriangleMesh:
     """Midpoint subdivision, 1 to 4: the same polyhedral surface. Child 3 of face f is its middle triangle."""
     ends = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)  # (3m, 2), halfedge 3f + k
@@ -154,6 +185,8 @@ FAMILIES: dict[str, Callable[[], TriangleMesh]] = {
     "holes": with_holes,
     "creased": creased,
     "sliver": sliver,
+    "lattice": lattice,
+    "blocks": blocks,
 }
 
 
