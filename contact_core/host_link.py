@@ -28,6 +28,7 @@ class HostLink:
         self._storage = host if isinstance(host, DocumentStorage) else None
         self._undo = host if isinstance(host, Undo) and self._storage is not None else None
         self._stop: Callable[[], None] | None = None
+        self._began_in_host = False  # the history starts at a document that the host stored
 
     def listen(self) -> None:
         """Follow the host's undo from now on, until `close`."""
@@ -45,6 +46,7 @@ class HostLink:
         Raises FileRefused for one that a newer release wrote; it stays untouched.
         """
         stored = self._storage.stored_document() if self._storage is not None else None
+        self._began_in_host = stored is not None
         if stored is None:
             return None
         if stored.schema > VERSION:
@@ -83,6 +85,10 @@ class HostLink:
         """Go to the document that the host holds now."""
         session = self._session
         stored = self._storage.stored_document() if self._storage is not None else None
+        if stored is None and self._began_in_host:  # undone past the beginning of all that was ever stored
+            self._began_in_host = False
+            session.adopt(History(ContactDocument()))
+            return
         revision = stored.revision if stored is not None else session.history.base_revision
         if revision == session.revision:
             return

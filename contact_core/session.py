@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.document.document import ContactDocument
 from contact_core.edit.announcer import Announcer, DocumentChanged, Listener
-from contact_core.edit.command import Command, register_command
+from contact_core.edit.command import Command
 from contact_core.edit.derived import Derived
 from contact_core.edit.history import History, Step
 from contact_core.edit.open_document import OpenDocument, real_path
@@ -20,13 +20,11 @@ from contact_core.edit.open_macro import OpenMacro
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
 from contact_core.errors import CommandRejected, FileRefused
-from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.plugins.verbs import PluginVerbs
 from contact_core.proposals.verbs import ProposalVerbs
 
 if TYPE_CHECKING:
-    from contact_core.contact.brush import Brush
     from contact_core.host_link import HostLink
-    from contact_core.plugins.manager import PluginManager
     from contact_core.proposals.proposal import Proposal
 
 log = logging.getLogger(__name__)
@@ -35,7 +33,7 @@ log = logging.getLogger(__name__)
 __all__ = ["DocumentChanged", "Session"]
 
 
-class Session(ProposalVerbs):
+class Session(PluginVerbs, ProposalVerbs):
     """Edits one document.
 
     document: to start from, empty by default. plugins: modules or objects with hook implementations, of highest
@@ -63,8 +61,7 @@ class Session(ProposalVerbs):
         self._macro: OpenMacro | None = None
         self._stroke: Stroke | None = None
         self._editing = RLock()
-        self._plugins: PluginManager | None = None
-        self._plugin_arguments = (tuple(plugins), discover)
+        self._equip(plugins, discover=discover)
         self.host = host
         self._host_link: HostLink | None = None
         if host is not None:
@@ -300,44 +297,6 @@ class Session(ProposalVerbs):
         """Tell listeners of a preview of what is proposed; None: back to the document."""
         self._preview(self.document, self.document if ghost is None else ghost.ghost)
 
-    # -- plugins -------------------------------------------------------------------------------------------------
-
-    @property
-    def plugins(self) -> PluginManager:
-        """The plugins of this session, found at the first use."""
-        if self._plugins is None:
-            from contact_core.plugins.manager import PluginManager
-
-            given, discover = self._plugin_arguments
-            self._plugins = PluginManager(given, discover=discover)
-        return self._plugins
-
-    def register_commands(self) -> None:
-        """Make the commands of plugins known, so that journals which hold them replay."""
-        from contact_core.plugins.registry import COMMANDS
-
-        for command in self.plugins.offers(COMMANDS).values():
-            register_command(command)
-
-    def default_axis(self, surface: str, patch: str, points: SurfacePoints, generator: str | None) -> SurfacePoints:
-        """Axis points from an axis generator: the one named, or the one that the plugins choose."""
-        from contact_core.plugins.registry import AXIS_GENERATORS
-
-        offered = self.plugins.offers(AXIS_GENERATORS)
-        if generator is None and offered:
-            generator = self.plugins.choose(
-                "contact_choose_axis_generator", offered, surface=surface, patch=patch
-            ) or next(iter(offered))
-        if generator is None:
-            return super().default_axis(surface, patch, points, generator)
-        return self.plugins.get(AXIS_GENERATORS, generator).generate(self.axis_request(surface, patch, points))
-
-    def named_brush(self, name: str) -> Brush:
-        """A brush of this session's plugins. Raises InvalidInput that lists what there is."""
-        from contact_core.plugins.registry import BRUSHES
-
-        return self.plugins.get(BRUSHES, name)
-
     # -- inside --------------------------------------------------------------------------------------------------
 
     @contextlib.contextmanager
@@ -378,13 +337,6 @@ class Session(ProposalVerbs):
 
     def _preview(self, start: ContactDocument, shown: ContactDocument) -> None:
         self._announcer.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))
-
-    def _tell_plugins(self, change: DocumentChanged) -> None:
-        """Plugins hear what is committed, from the first commit on, whether or not they were asked for before."""
-        if change.kind != "preview":
-            self.plugins.notify(
-                "contact_document_changed", document=change.after, revision=change.revision, origin=change.origin
-            )
 
 
 def _close_quietly(document: OpenDocument) -> None:

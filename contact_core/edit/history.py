@@ -122,11 +122,17 @@ class History:
         """Apply and commit. Raises CommandRejected; then nothing has changed."""
         return self.commit(self.prepare(command, origin, merge=merge))
 
-    def do_as(self, command: Command, origin: str, revision: int) -> Step:
-        """Apply and commit under the revision number that a journal gave it. Raises CommandRejected."""
+    def do_as(self, command: Command, origin: str, revision: int, *, merged: bool = False) -> Step:
+        """Apply and commit under the revision number that a journal gave it, in place of the last step if `merged`.
+
+        Raises CommandRejected; then nothing has changed.
+        """
         if revision <= self._last_revision:
             raise CommandRejected(f"revision {revision} comes after revision {self._last_revision} already.")
-        return self.commit(Step(revision, command, self.document, apply_command(command, self.document), origin))
+        if merged and not self.can_undo:
+            raise CommandRejected("there is no step that this one could take the place of.")
+        before = self._steps[self._cursor - 1].before if merged else self.document
+        return self.commit(Step(revision, command, before, apply_command(command, before), origin, merged))
 
     def undo(self) -> Step:
         """Step back; answers the step that was undone. Raises CommandRejected at the beginning."""

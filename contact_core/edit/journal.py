@@ -246,9 +246,8 @@ def _event_of(step: Step) -> dict[str, Any]:
 def _replay_event(history: History, event: dict[str, Any]) -> None:
     if "do" in event:
         command = command_from_json(event["do"])
-        if event.get("merged"):
-            history.undo()  # the recorded command is the merged one: it takes the place of the last step
-        history.do_as(command, str(event.get("origin")), _whole_number(event, "at"))
+        merged = bool(event.get("merged"))  # then the recorded command is the merged one
+        history.do_as(command, str(event.get("origin")), _whole_number(event, "at"), merged=merged)
     elif "goto" in event:
         history.goto(_whole_number(event, "goto"))
     elif "saved" in event and not (isinstance(event.get("file"), str) and _whole_number(event, "saved") >= 0):

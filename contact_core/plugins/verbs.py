@@ -1,0 +1,67 @@
+"""The verbs that ask plugins: for axes, for brushes, for the commands that a journal may hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from contact_core.edit.announcer import DocumentChanged
+from contact_core.edit.command import register_command
+from contact_core.edit.verbs import SurfaceVerbs, Verbs
+from contact_core.geometry.surface_point import SurfacePoints
+
+if TYPE_CHECKING:
+    from contact_core.contact.brush import Brush
+    from contact_core.plugins.manager import PluginManager
+
+
+class PluginVerbs(Verbs, SurfaceVerbs):
+    """An editor with a plugin manager of its own, which looks for plugins at the first use."""
+
+    def _equip(self, plugins: Iterable[object], *, discover: bool) -> None:
+        """plugins: of highest precedence. discover: whether entry points are read."""
+        self._plugins: PluginManager | None = None
+        self._plugin_arguments = (tuple(plugins), discover)
+
+    @property
+    def plugins(self) -> PluginManager:
+        """The plugins of this session, found at the first use."""
+        if self._plugins is None:
+            from contact_core.plugins.manager import PluginManager
+
+            given, discover = self._plugin_arguments
+            self._plugins = PluginManager(given, discover=discover)
+        return self._plugins
+
+    def register_commands(self) -> None:
+        """Make the commands of plugins known, so that journals which hold them replay."""
+        from contact_core.plugins.registry import COMMANDS
+
+        for command in self.plugins.offers(COMMANDS).values():
+            register_command(command)
+
+    def default_axis(self, surface: str, patch: str, points: SurfacePoints, generator: str | None) -> SurfacePoints:
+        """Axis points from an axis generator: the one named, or the one that the plugins choose."""
+        from contact_core.plugins.registry import AXIS_GENERATORS
+
+        offered = self.plugins.offers(AXIS_GENERATORS)
+        if generator is None and offered:
+            generator = self.plugins.choose(
+                "contact_choose_axis_generator", offered, surface=surface, patch=patch
+            ) or next(iter(offered))
+        if generator is None:
+            return super().default_axis(surface, patch, points, generator)
+        return self.plugins.get(AXIS_GENERATORS, generator).generate(self.axis_request(surface, patch, points))
+
+    def named_brush(self, name: str) -> Brush:
+        """A brush of this session's plugins. Raises InvalidInput that lists what there is."""
+        from contact_core.plugins.registry import BRUSHES
+
+        return self.plugins.get(BRUSHES, name)
+
+    def _tell_plugins(self, change: DocumentChanged) -> None:
+        """Plugins hear what is committed, from the first commit on, whether or not they were asked for before."""
+        if change.kind != "preview":
+            self.plugins.notify(
+                "contact_document_changed", document=change.after, revision=change.revision, origin=change.origin
+            )
