@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import re
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
@@ -64,8 +65,9 @@ def _run(argv: Sequence[str] | None, plugins: PluginManager | None) -> int:
     # With --json the answer stands alone on standard output: what a plugin prints goes to stderr.
     with contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext():
         plugins = plugins or PluginManager()
+        parser = _parser(_commands(plugins))
         with contextlib.redirect_stdout(stdout):  # --help and --version are answers, too
-            arguments = _parser(_commands(plugins)).parse_args(argv)
+            arguments = parser.parse_args(argv)
         arguments.plugins = plugins
         output = Output(json=arguments.json, quiet=arguments.quiet, stdout=stdout)
         with output.closing(), warnings.catch_warnings():
@@ -81,6 +83,9 @@ def _commands(plugins: PluginManager) -> Mapping[str, CliCommand]:
     for name, command in plugins.offers(CLI).items():
         if name in own:
             plugins.refuse(CLI, name, "contact has a sub-command of that name itself; rename it")
+            continue
+        if not re.fullmatch(r"\w[\w.-]*", name):
+            plugins.refuse(CLI, name, "nobody could type it; use letters, digits and hyphens")
             continue
         try:
             command.configure(argparse.ArgumentParser(parents=[_shared()]))

@@ -18,8 +18,8 @@ def is_wrapper(options: Any) -> bool:
 
 
 def hook_mistakes(plugin: object) -> list[str]:
-    """What pluggy passes over in silence: misspelt hooks, forgotten marks, wrappers."""
-    mistakes = []
+    """What pluggy passes over in silence: misspelt hooks, forgotten marks, wrappers, and no hook at all."""
+    mistakes, marked = [], False
     for name in dir(plugin):
         try:
             member = inspect.getattr_static(plugin, name)
@@ -29,13 +29,27 @@ def hook_mistakes(plugin: object) -> list[str]:
         if options is None:
             if name in HOOKS and callable(getattr(plugin, name)):
                 mistakes.append(f"{name} is not marked with @hookimpl, so it is never called.")
-        elif (options.get("specname") or name) not in HOOKS:
+            continue
+        marked = True
+        if (options.get("specname") or name) not in HOOKS:
             near = difflib.get_close_matches(name, HOOKS, n=1, cutoff=0.5)
             hint = f"did you mean {near[0]}?" if near else f"there are: {', '.join(HOOKS)}."
             mistakes.append(f"there is no hook {name}; {hint}")
         elif is_wrapper(options):
             mistakes.append(f"{name} is a hook wrapper; wrappers are not called here.")
-    return mistakes
+    return mistakes if mistakes or marked else [_nothing(plugin)]
+
+
+def _nothing(plugin: object) -> str:
+    """That a plugin has no hook; where its author put them into a class, what makes that work."""
+    for name, member in getattr(plugin, "__dict__", {}).items():
+        if isinstance(member, type) and any(hasattr(each, "contact_impl") for each in vars(member).values()):
+            module = getattr(plugin, "__name__", "module")
+            return (
+                f"has hooks in the class {name} alone: put the functions, without self, at the top of the module,"
+                f' or let the entry point say "{module}:{name}".'
+            )
+    return f"has no hook: a function marked with @hookimpl was wanted; there are: {', '.join(HOOKS)}."
 
 
 def api_refusal(plugin: object) -> str | None:

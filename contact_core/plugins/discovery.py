@@ -6,10 +6,12 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
-from importlib.metadata import Distribution, EntryPoint, distributions
+from importlib.metadata import Distribution, distributions
 from typing import Literal
 
+from contact_core.errors import InvalidInput
 from contact_core.plugins.registry import resolve
 
 GROUP = "contact_core.plugins"
@@ -47,24 +49,33 @@ def _from_variable(word: str) -> Candidate:
 def _from_entry_points() -> list[Candidate]:
     """Built-ins first, then the others by distribution and name; a distribution found twice counts once."""
     found: dict[tuple[bool, str, str], Candidate] = {}
-    for distribution, entry in _entries():
+    for distribution, name, load in _entries():
         owner = _distribution_name(distribution)
         foreign = owner != _OWN_DISTRIBUTION
         origin: Origin = "entry point" if foreign else "built-in"
-        candidate = Candidate(entry.name, origin, f"{owner} {distribution.version or '?'}", entry.load)
-        found.setdefault((foreign, owner, entry.name), candidate)
+        candidate = Candidate(name or owner, origin, f"{owner} {distribution.version or '?'}", load)
+        found.setdefault((foreign, owner, name), candidate)
     return [found[key] for key in sorted(found)]
 
 
-def _entries() -> Iterator[tuple[Distribution, EntryPoint]]:
+def _entries() -> Iterator[tuple[Distribution, str, Callable[[], object]]]:
     """Entry points of our group, one distribution at a time: a damaged one must not hide the others."""
     for distribution in distributions():
         try:
             text = distribution.read_text("entry_points.txt") or ""
-            if GROUP in text:  # most have none: reading the text is cheaper than parsing it
-                yield from ((distribution, entry) for entry in distribution.entry_points.select(group=GROUP))
-        except Exception:  # foreign metadata may be broken in any way and is not ours to report
+        except Exception:  # whether it has something for us cannot be known
             continue
+        if GROUP in text:  # most have none: reading the text is cheaper than parsing it
+            try:
+                entries = tuple(distribution.entry_points.select(group=GROUP))
+            except Exception as error:
+                yield distribution, "", partial(_unreadable, error)
+            else:
+                yield from ((distribution, entry.name, entry.load) for entry in entries)
+
+
+def _unreadable(error: Exception) -> object:
+    raise InvalidInput(f"its entry_points.txt cannot be read, {error}") from error
 
 
 def _distribution_name(distribution: Distribution) -> str:

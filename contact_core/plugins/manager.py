@@ -50,9 +50,9 @@ class PluginManager:
     ) -> Callable[[], None]:
         """Add a plugin with the highest precedence; returns the function that takes it out again.
 
-        plugin: a module, an object, or a class, which is called without arguments. replaces: names of objects whose
-        place this plugin's objects take. Unlike a discovered plugin, one that is handed over by a program is refused
-        at once, with InvalidInput, for anything that is wrong with it.
+        plugin: a module, an object, or a class, which is called without arguments. replaces: names of objects
+        whose place this plugin's objects take. Unlike a discovered plugin, one that is handed over by a program is
+        refused at once, with InvalidInput, for anything that is wrong with it.
         """
         name = name or _name_of(plugin)
         if name in self._records:

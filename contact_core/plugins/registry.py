@@ -94,9 +94,11 @@ def shortcomings(candidate: object, slot: Slot[Any]) -> list[str]:
                 result.append(f"has no {name}" + ("()" if callable(member) else ""))
         elif callable(member):
             result += _call_shortcomings(name, member, getattr(candidate, name), bound=slot.instances)
+    if not slot.instances and not isinstance(candidate, type):
+        result.append("is an object where a class is wanted")
     key = getattr(candidate, slot.key, None)
-    if not (isinstance(key, str) and key):
-        result.append(f"needs a {slot.key}, a non-empty string, but has {key!r}")
+    if not (isinstance(key, str) and key and key.isprintable() and key == key.strip()):
+        result.append(f"needs a {slot.key}, a non-empty string of printable letters, but has {key!a}")
     return result
 
 

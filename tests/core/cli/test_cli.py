@@ -85,6 +85,69 @@ def test_a_plugin_brings_a_sub_command(shouting: PluginManager, capsys: pytest.C
     assert json.loads(out) == {"word": "hello"} and err == ""
 
 
+def commanding(name: str, summary: str = "says nothing", error: Exception | None = None) -> PluginManager:
+    """A plugin with one sub-command, which prints at every chance, and `shout` beside it."""
+
+    class Chatty(Shout):
+        def configure(self, parser: argparse.ArgumentParser) -> None:
+            print("setting up")  # noqa: T201
+            if error is not None:
+                raise error
+            super().configure(parser)
+
+    Chatty.name, Chatty.summary = name, summary
+
+    def contact_cli() -> list[type]:
+        print("offering")  # noqa: T201
+        return [Chatty]
+
+    chatty, shouting = ModuleType("chatty"), ModuleType("shouting")
+    chatty.contact_cli = hookimpl(contact_cli)  # type: ignore[attr-defined]
+    shouting.contact_cli = hookimpl(lambda: [Shout])  # type: ignore[attr-defined]
+    return PluginManager([chatty, shouting], discover=False)
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "reason"),
+    [
+        ("broken", ValueError("no such option"), "cannot be set up: ValueError: no such option"),
+        ("plugins", None, "contact has a sub-command of that name itself"),
+        ("--help me", None, "nobody could type it"),
+    ],
+)
+def test_an_unsound_sub_command_is_left_out_and_named(
+    name: str, error: Exception | None, reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plugins = commanding(name, error=error)
+    assert main(["shout", "on"], plugins=plugins) == 0
+    assert capsys.readouterr().out.endswith("ON\n")
+    assert main(["plugins", "--check"], plugins=plugins) == 1
+    told = capsys.readouterr().out
+    assert f"its sub-command {name!r} is refused" in told and reason in told
+    assert "sub-command: shout" in told and f"sub-command: {name}" not in told
+
+
+def test_a_summary_may_hold_a_percent_sign(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["--help"], plugins=commanding("all", "100% (of it)"))
+    assert end.value.code == 0 and "100% (of it)" in capsys.readouterr().out
+
+
+def test_what_plugins_print_is_no_part_of_a_json_answer(capsys: pytest.CaptureFixture[str]) -> None:
+    plugins = commanding("all")
+    capsys.readouterr()
+    assert main(["all", "word", "--json"], plugins=plugins) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {"word": "word"} and "setting up" in err
+
+
+def test_what_would_steer_a_terminal_is_spelt_out(capsys: pytest.CaptureFixture[str]) -> None:
+    module = ModuleType("red\x1b[31m")
+    module.contact_cli = hookimpl(lambda: [Shout])  # type: ignore[attr-defined]
+    assert main(["plugins"], plugins=PluginManager([module], discover=False)) == 0
+    assert "red\\x1b[31m" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("word", "code", "sentence"),
     [

@@ -97,6 +97,56 @@ BROKEN = {
     "spelling": (OFFER + "@hookimpl\ndef contact_placers(): return ['reference.Mine']\n", "package.module:Name"),
     "future": (OFFER + "CONTACT_API = '>=2.0'\n@hookimpl\ndef contact_placers(): return [Mine]\n", "API >=2.0"),
     "range": (OFFER + "CONTACT_API = 'new'\n@hookimpl\ndef contact_placers(): return [Mine]\n", '">=1.0,<2"'),
+    "no_exception": (
+        "class Skipped(BaseException): pass\nraise Skipped('no screen')\n",  # as pytest.importorskip raises
+        "cannot be imported: Skipped: no screen",
+    ),
+    "hook_no_exception": (
+        OFFER + "class Out(BaseException): pass\n@hookimpl\ndef contact_placers(): raise Out('now')\n",
+        "its hook contact_placers raised Out: now",
+    ),
+    "no_hook": ("answer = 42\n", "has no hook: a function marked with @hookimpl was wanted"),
+    "in_a_class": (
+        OFFER + "class Plugin:\n    @hookimpl\n    def contact_placers(self): return [Mine]\n",
+        'let the entry point say "in_a_class:Plugin"',
+    ),
+    "evil_module": (
+        "def __getattr__(name): raise RuntimeError('no ' + name)\n",
+        "cannot be looked at: RuntimeError",
+    ),
+    "evil_range": (
+        OFFER + "class Range:\n    def __str__(self): raise ValueError('mute')\nCONTACT_API = Range()\n",
+        "cannot be looked at: ValueError: mute",
+    ),
+    "evil_object": (
+        OFFER + "class Evil:\n    def __getattr__(self, name): raise RuntimeError('no ' + name)\n"
+        "@hookimpl\ndef contact_placers(): return [Evil()]\n",
+        "its placer 'Evil' cannot be made: RuntimeError: no name",
+    ),
+    "mute_error": (
+        OFFER + "class Mute(Exception):\n    def __str__(self): raise ValueError\n"
+        "@hookimpl\ndef contact_placers(): raise Mute\n",
+        "raised Mute.",
+    ),
+    "without_end": (
+        OFFER + "import itertools\n@hookimpl\ndef contact_placers(): return itertools.repeat(7)\n",
+        "goes on after 1000 offers",
+    ),
+    "one_string": (OFFER + "@hookimpl\ndef contact_placers(): return 'a:B'\n", "returned str; put it in a list"),
+    "unprintable": (
+        OFFER + "Mine.name = 'red\\x1b[31m'\n@hookimpl\ndef contact_placers(): return [Mine]\n",
+        r"printable letters, but has 'red\x1b[31m'",
+    ),
+    "blank": (OFFER + "Mine.name = ' '\n@hookimpl\ndef contact_placers(): return [Mine]\n", "but has ' '"),
+    "replaces_number": (
+        OFFER + "Mine.replaces = 5\n@hookimpl\ndef contact_placers(): return [Mine]\n",
+        "its placer 'Mine' cannot be made: TypeError",
+    ),
+    "host_object": (
+        OFFER + "class Host:\n    name = 'h'\n    def space(self): ...\n"
+        "@hookimpl\ndef contact_hosts(): return [Host()]\n",
+        "is an object where a class is wanted",
+    ),
 }
 
 
@@ -112,6 +162,49 @@ def test_a_broken_distribution_is_named_and_stops_nobody(install: Any, name: str
     assert not record.offers
     assert "sound" in manager.offers(PLACERS)
     assert not record_of(manager, "zz_sound").problems
+
+
+def test_the_entry_point_may_be_a_class(install: Any) -> None:
+    methods = "class Plugin:\n    @hookimpl\n    def contact_placers(self): return [Mine]\n"
+    install("with_class", OFFER + methods, entry="with_class:Plugin")
+    record = record_of(PluginManager(environ={}), "with_class")
+    assert not record.problems and record.offers == {"placer": ["mine"]}
+
+
+def test_an_entry_point_that_cannot_be_parsed_is_named(install: Any, tmp_path: Path) -> None:
+    install("garbled", "")
+    text = "[contact_core.plugins]\nthis is no line of it\n"
+    (tmp_path / "garbled-2.1.dist-info" / "entry_points.txt").write_text(text)
+    record = record_of(PluginManager(environ={}), "garbled")
+    assert record.source == "garbled 2.1" and "entry_points.txt cannot be read" in record.problems[0]
+
+
+def test_only_the_user_interrupts() -> None:
+    """Ctrl+C while a plugin is at work ends the program, as everywhere."""
+
+    def contact_placers() -> Any:
+        raise KeyboardInterrupt
+
+    module = ModuleType("busy")
+    module.contact_placers = hookimpl(contact_placers)  # type: ignore[attr-defined]
+    with pytest.raises(KeyboardInterrupt):
+        PluginManager([module], discover=False)
+
+
+def test_a_name_to_replace_that_nobody_has_is_a_problem(install: Any) -> None:
+    hook = "@hookimpl\ndef contact_placers(): return [Mine]\n"
+    install("aa_base", OFFER + hook)
+    install("over", OFFER + "Mine.name, Mine.replaces = 'new', 'mien'\n" + hook)
+    problems = record_of(PluginManager(environ={}), "over").problems
+    assert len(problems) == 1 and "replaces 'mien'" in problems[0] and "did you mean 'mine'?" in problems[0]
+
+
+def test_asking_for_what_a_missing_library_would_bring_says_so(install: Any) -> None:
+    install("needy", OFFER + "@hookimpl\ndef contact_placers(): return ['needy_part:Mine']\n")
+    install("needy_part", "from contact_core.errors import MissingExtra\nraise MissingExtra('Magic', 'viewer')\n")
+    manager = PluginManager(environ={"CONTACT_PLUGINS": "no:needy_part"})
+    with pytest.raises(InvalidInput, match=r"no placer 'mine'.*contact-core\[viewer\]"):
+        manager.get(PLACERS, "mine")
 
 
 def test_a_missing_optional_library_is_no_problem(install: Any) -> None:
@@ -196,7 +289,7 @@ def test_without_discovery_only_what_is_given_is_there() -> None:
 
 def test_asking_for_what_is_not_there_lists_what_is() -> None:
     manager = PluginManager([plugin(Named("naive"), Named("from_pose"))], discover=False)
-    with pytest.raises(InvalidInput, match=r"no placer 'form_pose'; there are: from_pose\."):
+    with pytest.raises(InvalidInput, match=r"no placer 'form_pose'; there are: from_pose, naive\."):
         manager.get(PLACERS, "form_pose")
     with pytest.raises(InvalidInput, match=r"no sub-command 'usd'; there are: none\."):
         manager.get(CLI, "usd")

@@ -1,0 +1,68 @@
+"""What is known of one plugin, and how it is borne when it raises."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from contact_core.errors import MissingExtra
+from contact_core.plugins.discovery import Origin
+
+
+class Offer(NamedTuple):
+    """A sound object of a plugin. replaces: names of objects whose place it takes."""
+
+    name: str
+    made: Any
+    replaces: tuple[str, ...]
+
+
+@dataclass
+class PluginRecord:
+    """What is known of one plugin. source: distribution and version, or where else it came from.
+
+    problems: sentences, empty when all is well.  absent: sentences on what a library that is not installed would
+    bring; that is no problem.  offers: noun of a slot -> names, filled as slots are asked for.
+    """
+
+    name: str
+    origin: Origin
+    source: str
+    plugin: object | None = None  # None: it could not be used at all
+    replaces: tuple[str, ...] = ()
+    problems: list[str] = field(default_factory=list)
+    absent: list[str] = field(default_factory=list)
+    offers: dict[str, list[str]] = field(default_factory=dict)
+    collected: dict[str, list[Offer]] = field(default_factory=dict, repr=False)  # hook -> sound objects
+
+    def complain(self, sentence: str) -> None:
+        """Write a problem down, once."""
+        if sentence not in self.problems:
+            self.problems.append(sentence)
+
+    @contextmanager
+    def bearing(self, what: str, missing: str = "") -> Iterator[None]:
+        """Whatever a plugin raises inside is written down after `what`, and the program goes on.
+
+        Whatever: a module may end in SystemExit, or in pytest's Skipped, which is no Exception either. Only Ctrl+C
+        is the user's and goes through. A missing optional library is told after `missing`, and is no problem.
+        """
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise
+        except MissingExtra as error:
+            self.absent.append(f"{missing}{error}")
+        except BaseException as error:
+            self.complain(f"{what} {spell(error)}.")
+
+
+def spell(error: BaseException) -> str:
+    """One line: the kind of the error and what it said."""
+    try:
+        said = " ".join(str(error).split())
+    except Exception:  # an error of a plugin may fail even to say what it is
+        said = ""
+    return f"{type(error).__name__}: {said}".rstrip(": .")
