@@ -8,7 +8,6 @@ import numpy as np
 
 from contact_builtins.samples import catalogue
 from contact_builtins.terms.aims import Look, LookTerm
-from contact_builtins.terms.penetration import PenetrationTerm
 from contact_core.arrays import FloatArray
 from contact_core.contact.axis import draw_axis
 from contact_core.contact.patch import parameterize_patch, reconstruct_patch
@@ -19,6 +18,7 @@ from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading
 from contact_core.pose.body import Body, PairedPoints
+from contact_core.pose.penetration import PenetrationTerm
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.rig import Pose, Rig
 from contact_core.pose.terms import paper_terms

@@ -104,17 +104,22 @@ def reconstruct_axis(
 
     mirrored: every turning angle negated. Where a boundary stops the axis, its further points lie at the stop.
     """
-    m = shape.point_count
-    if m == 1:
+    if shape.point_count == 1:
         return Axis(root.point(), np.array([root.heading]), np.zeros(1))
-    turns = -shape.turning_angles if mirrored else shape.turning_angles  # (m - 2,)
-    chains = _prefix_chains(shape.lengths * (shape.along * unit), turns)
-    starts = root.point()[np.zeros(m - 1, np.int64)]
+    chains, bends = axis_chains(shape, mirrored=mirrored, unit=unit)
+    starts = root.point()[np.zeros(len(bends), np.int64)]
     trace = trace_chains(mesh, starts, chains.first * root.heading, chains.offsets, chains.turns, chains.lengths)
-    tangents = np.concatenate([[root.heading], trace.headings])  # (m,)
-    tangents[1:-1] *= np.exp(1j * turns)
+    tangents = np.concatenate([[root.heading], trace.headings * bends])  # (m,)
     points = SurfacePoints.concatenate([root.point(), trace.points])
     return Axis(points, tangents / np.abs(tangents), np.concatenate([[0.0], trace.remaining]))
+
+
+def axis_chains(shape: AxisShape, *, mirrored: bool, unit: float) -> tuple[Chains, ComplexArray]:
+    """The walks from the root to the m - 1 further points of an axis, and how its tangent turns where each arrives
+    (unit complex, (m - 1,))."""
+    turns = -shape.turning_angles if mirrored else shape.turning_angles  # (m - 2,)
+    bends = np.exp(1j * np.concatenate([turns, np.zeros(shape.point_count - 1 - len(turns))]))
+    return _prefix_chains(shape.lengths * (shape.along * unit), turns), bends
 
 
 def root_from_point(

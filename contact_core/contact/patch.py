@@ -98,15 +98,22 @@ def points_from_axis(
     unit: float = 1.0,
 ) -> PatchPoints:
     """The points that hang on a reconstructed axis: one trace each, all in one batch."""
-    legs, lengths = scaled_legs(coordinates, axis_shape.along * unit, axis_shape.spread * unit)
-    angles = coordinates.chain_angles
-    if mirrored:
-        legs, angles = np.conj(legs), -angles
+    legs, angles, lengths = patch_chains(coordinates, axis_shape, mirrored=mirrored, unit=unit)
     anchors = coordinates.anchors
     trace = trace_chains(
         mesh, axis.points[anchors], legs * axis.tangents[anchors], coordinates.chain_starts, angles, lengths
     )
     return PatchPoints(trace.points, trace.remaining + axis.remaining[anchors], axis, trace.headings)
+
+
+def patch_chains(
+    coordinates: PatchCoordinates, axis_shape: AxisShape, *, mirrored: bool, unit: float
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """The walks from the anchors to n points: first legs (n,) relative to the anchors' tangents, then the angles
+    and lengths of the legs after them (by `coordinates.chain_starts`)."""
+    legs, lengths = scaled_legs(coordinates, axis_shape.along * unit, axis_shape.spread * unit)
+    angles = coordinates.chain_angles
+    return (np.conj(legs), -angles, lengths) if mirrored else (legs, angles, lengths)
 
 
 def transfer_patch(

@@ -11,6 +11,8 @@ true derivative.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -32,6 +34,7 @@ class DistanceField:
     origin: FloatArray
     spacing: float
     values: FloatArray
+    _of_mesh: ClassVar[WeakKeyDictionary[TriangleMesh, dict[str, DistanceField]]] = WeakKeyDictionary()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "origin", frozen(self.origin, np.float64, (3,), "origin"))
@@ -40,9 +43,18 @@ class DistanceField:
     @classmethod
     def of(cls, mesh: TriangleMesh, *, resolution: int = 64, margin: float = 0.15) -> DistanceField:
         """The field of a mesh: `resolution` nodes along the longest side of its box widened by `margin` of its
-        diagonal. Kept on disk by content; raises InvalidInput for a mesh without faces or a bad resolution."""
+        diagonal. Kept with the mesh, and on disk by content; raises InvalidInput for a mesh without faces or a bad
+        resolution."""
         if not 4 <= resolution <= 256:
             raise InvalidInput(f"a distance field needs 4 to 256 nodes a side, but {resolution} were asked for.")
+        settings = f"{resolution}-{margin:g}-v{VERSION}"
+        kept = cls._of_mesh.setdefault(mesh, {})
+        if settings not in kept:
+            kept[settings] = cls._made(mesh, resolution, margin, f"{mesh.digest}-{settings}")
+        return kept[settings]
+
+    @classmethod
+    def _made(cls, mesh: TriangleMesh, resolution: int, margin: float, key: str) -> DistanceField:
         used = mesh.points[np.unique(mesh.faces)]
         if not len(used):
             raise InvalidInput("a distance field needs a mesh with faces, but it has none.")
@@ -55,7 +67,6 @@ class DistanceField:
             values = _signed_distances(mesh, low, spacing, shape)
             return {"values": values.astype(np.float32)}
 
-        key = f"{mesh.digest}-{resolution}-{margin:g}-v{VERSION}"
         values = cached_arrays("distance-fields", key, make)["values"]
         return cls(low, spacing, values)
 

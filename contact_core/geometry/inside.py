@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,21 +12,20 @@ from contact_core.geometry.raycast import Locator
 
 
 class Sunk(NamedTuple):
-    """depths: (n,) of each vertex, 0 outside. deepest: the largest. share: of the area, a third of each face to each
-    of its corners."""
+    """How a surface is sunk into solids. depths: (n,) of each vertex, 0 outside. deepest: the largest. share: of
+    the area, a third of each face to each of its corners."""
 
     depths: FloatArray
     deepest: float
     share: float
 
-
-def sunk(surface: TriangleMesh, solids: Sequence[TriangleMesh]) -> Sunk:
-    """How a surface is sunk into solids (at least one): a vertex counts by the solid that it is deepest in."""
-    depths = np.max([depth_inside(surface.points, solid) for solid in solids], axis=0)  # (n,)
-    share = np.zeros(len(depths))
-    np.add.at(share, surface.faces.ravel(), np.repeat(surface.face_areas / 3.0, 3))
-    inside = float(share[depths > 0].sum() / max(share.sum(), 1e-300))
-    return Sunk(depths, float(depths.max(initial=0.0)), inside)
+    @classmethod
+    def of(cls, surface: TriangleMesh, depths: FloatArray) -> Sunk:
+        """Out of the depths (n,) of its vertices."""
+        area = np.zeros(len(depths))
+        np.add.at(area, surface.faces.ravel(), np.repeat(surface.face_areas / 3.0, 3))
+        inside = float(area[depths > 0].sum() / max(area.sum(), 1e-300))
+        return cls(depths, float(depths.max(initial=0.0)), inside)
 
 
 def depth_inside(points: FloatArray, solid: TriangleMesh) -> FloatArray:

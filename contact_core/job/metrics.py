@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray
+from contact_core.geometry.inside import Sunk, depth_inside
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
@@ -116,26 +117,9 @@ def _depth_metrics(scene: PosedScene) -> dict[str, float | None]:
     """Deepest skin vertex, and the fraction of skin area, inside any solid (winding number > 0.5)."""
     if not scene.solids:
         return {"max_penetration": None, "skin_inside": None}
-    depth = np.max([depth_inside(scene.skin.points, solid) for solid in scene.solids], axis=0)  # (n,)
-    share = np.zeros(len(depth))  # a third of each face's area to each of its corners
-    np.add.at(share, scene.skin.faces.ravel(), np.repeat(scene.skin.face_areas / 3.0, 3))
-    return {
-        "max_penetration": float(depth.max(initial=0.0) / scene.length),
-        "skin_inside": float(share[depth > 0].sum() / max(share.sum(), 1e-300)),
-    }
-
-
-def depth_inside(points: FloatArray, solid: TriangleMesh) -> FloatArray:
-    """(n,) distance to the surface for points inside a solid by generalised winding number > 0.5, else 0."""
-    used = solid.points[np.unique(solid.faces)]
-    near = ((points >= used.min(axis=0)) & (points <= used.max(axis=0))).all(axis=1)
-    depth = np.zeros(len(points))
-    locator = Locator.of(solid)
-    inside = np.flatnonzero(near)
-    inside = inside[locator.winding_number(points[inside]) > 0.5] if len(inside) else inside
-    if len(inside):
-        depth[inside] = locator.closest(points[inside]).distance
-    return depth
+    depths = np.max([depth_inside(scene.skin.points, solid) for solid in scene.solids], axis=0)  # (n,)
+    found = Sunk.of(scene.skin, depths)
+    return {"max_penetration": found.deepest / scene.length, "skin_inside": found.share}
 
 
 def bones_through(bones: FloatArray, mesh: TriangleMesh) -> BoolArray:

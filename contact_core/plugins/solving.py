@@ -3,6 +3,8 @@ told."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_SOLVERS
 from contact_core.pose.problem import PoseProblem
@@ -26,3 +28,18 @@ def solve_by_plugin(
     solution = plugins.get(POSE_SOLVERS, name).solve(problem, options, progress)
     plugins.notify("contact_pose_solved", problem=problem, solution=solution)
     return solution
+
+
+@dataclass(frozen=True)
+class PluginSolver:
+    """`solve_by_plugin` as a solver, for what takes one. wanted: a name; None leaves the choice to the plugins."""
+
+    plugins: PluginManager
+    wanted: str | None = None
+    name = "by plugin"
+    summary = "The solver that was named, or that the plugins choose."
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+    ) -> PoseSolution:
+        return solve_by_plugin(problem, self.plugins, self.wanted, options, progress)

@@ -254,6 +254,12 @@ class PoseProblem:
         return np.cumsum([0, *(c.watched if isinstance(c, BlackBoxChart) else 0 for c in self.charts)])
 
     @cached_property
+    def watched_dofs(self) -> IntArray:
+        """(q,) the free dofs of black boxes, as indices into theta."""
+        boxes = [self.dof_slices[i] for i, body in enumerate(self.bodies) if body.black_box is not None]
+        return np.concatenate([np.zeros(0, np.int64), *(np.arange(box.start, box.stop) for box in boxes)])
+
+    @cached_property
     def moves(self) -> FloatArray:
         """(d, j) 1 where a free dof moves a bone (over all bodies), else 0."""
         result = np.zeros((len(self.dof_names), int(self.bone_offsets[-1])))

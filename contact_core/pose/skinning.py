@@ -26,7 +26,8 @@ from contact_core.pose.rig import Rig
 
 @dataclass(frozen=True, eq=False)
 class Gram:
-    """What a weighted sum of squares needs of a track: sum_i w_i h_i h_i^T, or, where rows are watched, w."""
+    """What a weighted sum of squares needs of a track: sum_i w_i h_i h_i^T (width b, width b), and, where rows are
+    watched, the weights w (k,) themselves."""
 
     matrix: FloatArray
     weights: FloatArray
@@ -84,9 +85,7 @@ class Track:
         return Track(self.bones, self.matrix * factors[:, None], self.width, watched)
 
     def gram(self, weights: FloatArray) -> Gram:
-        """(width b, width b): sum_i weights_i h_i h_i^T, all that a weighted sum of squares needs of k rows."""
-        if self.watched is not None:
-            return Gram(np.zeros((0, 0)), weights)
+        """Of weights (k,): all that a weighted sum of squares needs of k rows."""
         return Gram(self.matrix.T @ (weights[:, None] * self.matrix), weights)
 
     @classmethod

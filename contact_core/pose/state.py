@@ -64,34 +64,44 @@ class PoseState:
 
         The virtual work of the forces: accumulated per bone first, so the cost hardly knows d or k.
         """
-        d = len(self.theta)
         if self.problem.is_still(track):
-            return np.zeros(d)
-        per_bone = forces.T @ track.matrix  # (3, width b)
-        result = self._derivative(track).reshape(d, -1) @ per_bone.ravel()
-        if track.watched is not None:
-            result = (
-                result + self._watched_derivative(track.width).reshape(d, -1) @ (track.watched.T @ forces).ravel()
-            )
+            return np.zeros(len(self.theta))
+        result = self._pull_on_bones(track, forces[None])[:, 0]
+        if self._moves_watched(track):
+            moved = self._watched_derivative(track.width)  # (q, m, 3)
+            result[self.problem.watched_dofs] += moved.reshape(len(moved), -1) @ (track.watched.T @ forces).ravel()
+        return result
+
+    def _pull_on_bones(self, track: Track, forces: FloatArray) -> FloatArray:
+        """(d, f) the virtual work of several sets of forces (f, k, 3) through the bones alone."""
+        sets, k, _ = forces.shape
+        per_bone = forces.transpose(0, 2, 1).reshape(3 * sets, k) @ track.matrix  # (3 f, width b)
+        moved = self._derivative(track)
+        result: FloatArray = moved.reshape(len(moved), -1) @ per_bone.reshape(sets, -1).T
         return result
 
     def quadratic(self, track: Track, gram: Gram) -> FloatArray:
-        """(d, d) sum_i w_i J_i^T J_i over the track's rows, from `track.gram(w)`; costs nothing per row."""
+        """(d, d) sum_i w_i J_i^T J_i over the track's rows, from `track.gram(w)`; costs nothing per row that is not
+        watched."""
         d = len(self.theta)
-        if track.watched is not None:
-            rows = self.jacobian(track) * np.sqrt(gram.weights)[:, None, None]  # (k, 3, d)
-            return rows.reshape(-1, d).T @ rows.reshape(-1, d)
         moved = self._derivative(track)  # (d, 3, width b)
-        return (moved.reshape(3 * d, -1) @ gram.matrix).reshape(d, -1) @ moved.reshape(d, -1).T
+        result = (moved.reshape(3 * d, -1) @ gram.matrix).reshape(d, -1) @ moved.reshape(d, -1).T
+        if self._moves_watched(track):
+            own = self._watched_rows(track)  # (q, k, 3)
+            weighted, dofs = own * gram.weights[:, None], self.problem.watched_dofs
+            cross = self._pull_on_bones(track, weighted)  # (d, q)
+            result[:, dofs] += cross
+            result[dofs] += cross.T
+            result[np.ix_(dofs, dofs)] += weighted.reshape(len(own), -1) @ own.reshape(len(own), -1).T
+        return result
 
     def jacobian(self, track: Track) -> FloatArray:
         """(k, 3, d) derivative of the track's vectors."""
         d = len(self.theta)
         flat = track.matrix @ self._derivative(track).reshape(3 * d, -1).T  # (k, 3 d)
         result: FloatArray = flat.reshape(len(track), d, 3).transpose(0, 2, 1)
-        if track.watched is not None:
-            moved = self._watched_derivative(track.width).transpose(1, 2, 0)  # (m, 3, d)
-            result = result + (track.watched @ moved.reshape(len(moved), -1)).reshape(len(track), 3, d)
+        if self._moves_watched(track):
+            result[:, :, self.problem.watched_dofs] += self._watched_rows(track).transpose(1, 2, 0)
         return result
 
     @cached_property
@@ -100,20 +110,30 @@ class PoseState:
         boxes = [motion for motion in self.motions if isinstance(motion, BlackBoxMotion)]
         return {4: np.concatenate([b.points for b in boxes]), 3: np.concatenate([b.normals for b in boxes])}
 
+    def _moves_watched(self, track: Track) -> bool:
+        """Whether free dofs of black boxes move what a track carries."""
+        return track.watched is not None and len(self.problem.watched_dofs) > 0
+
+    def _watched_rows(self, track: Track) -> FloatArray:
+        """(q, k, 3) derivative by the q dofs of black boxes of what a track takes from them."""
+        moved = self._watched_derivative(track.width)  # (q, m, 3)
+        q, m, _ = moved.shape
+        rows = track.watched @ moved.transpose(1, 0, 2).reshape(m, 3 * q)
+        return np.asarray(rows.reshape(-1, q, 3).transpose(1, 0, 2))
+
     def _watched_derivative(self, width: int) -> FloatArray:
-        """(d, m, 3) derivative of what black boxes evaluate."""
+        """(q, m, 3) derivative of what black boxes evaluate by their q dofs, all others leave it where it is."""
         if not self._differences:
-            total = len(self._watched[4])
-            self._differences.update(
-                {4: np.zeros((len(self.theta), total, 3)), 3: np.zeros((len(self.theta), total, 3))}
-            )
-            first = 0
+            shape = len(self.problem.watched_dofs), len(self._watched[4]), 3
+            self._differences.update({4: np.zeros(shape), 3: np.zeros(shape)})
+            first = row = 0
             for index, motion in enumerate(self.motions):
                 if isinstance(motion, BlackBoxMotion):
-                    rows, columns = self.problem.dof_slices[index], slice(first, first + len(motion.points))
-                    moved, turned = motion.derivatives(self.problem.free_of_body[index])
+                    free = self.problem.free_of_body[index]
+                    rows, columns = slice(row, row + len(free)), slice(first, first + len(motion.points))
+                    moved, turned = motion.derivatives(free)
                     self._differences[4][rows, columns], self._differences[3][rows, columns] = moved, turned
-                    first += len(motion.points)
+                    first, row = first + len(motion.points), row + len(free)
         return self._differences[width]
 
     @cached_property

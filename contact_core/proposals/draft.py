@@ -9,9 +9,10 @@ from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.command import Command, apply_command
 from contact_core.edit.commands import Settle
 from contact_core.edit.derived import Derived
+from contact_core.edit.pose_problem import pose_problem, surfaces_of
 from contact_core.edit.verbs import Verbs
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.problem import PoseProblem
+from contact_core.pose.body import Body
+from contact_core.pose.problem import Limits, PoseProblem
 from contact_core.pose.rig import Pose, Rig
 from contact_core.pose.terms import PoseTerm, paper_terms
 
@@ -37,34 +38,24 @@ class Draft(Verbs):
         self._document = apply_command(command, self._document)
         return 0
 
-    def problem(self, terms: tuple[PoseTerm, ...] = paper_terms()) -> PoseProblem:
+    def problem(self, terms: tuple[PoseTerm, ...] = paper_terms(), *, limits: Limits = "rig") -> PoseProblem:
         """All pairs, every rig in its pose, everything else where it stands. The world is the scene in the units of
         the first surface."""
         pairs = self.pairs()
-        names = list(dict.fromkeys(s for pair in pairs for s in (pair.manipulator_surface, pair.object_surface)))
-        bodies = []
-        for name in names:
+        names = surfaces_of(pairs)
+        unit = self.document.surface(names[0]).meters_per_unit if names else 1.0
+
+        def body_of(name: str) -> Body:
             record = self.document.surface(name)
             world = record.world_from_surface.copy()
-            world[:3] *= record.meters_per_unit / self.document.surface(names[0]).meters_per_unit
-            if name in self.rigs:
-                rig = self.rigs[name]
-                pose = self.document.poses.get(name) or Pose.rest(rig)
-                bodies.append(Body.skinned(rig, name=name, pose=pose, world_from_rig=world))
-            else:
-                bodies.append(Body.rigid(name, self.mesh(name), world_from_surface=world))
-        contacts = tuple(
-            PairedPoints(
-                pair.pair.name,
-                pair.manipulator_surface,
-                pair.manipulator_points,
-                pair.object_surface,
-                pair.object_points,
-                pair.weights,
-            )
-            for pair in pairs
-        )
-        return PoseProblem(tuple(bodies), contacts, terms)
+            world[:3] *= record.meters_per_unit / unit
+            if name not in self.rigs:
+                return Body.rigid(name, self.mesh(name), world_from_surface=world)
+            rig = self.rigs[name]
+            pose = self.document.poses.get(name) or Pose.rest(rig)
+            return Body.skinned(rig, name=name, pose=pose, world_from_rig=world)
+
+        return pose_problem(pairs, body_of, terms, limits=limits)
 
 
 def change(before: ContactDocument, after: ContactDocument, title: str) -> Settle:

@@ -16,13 +16,16 @@ from contact_core.edit.commands import Settle
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.plugins.registry import PLACERS, POSE_SOLVERS
 from contact_core.plugins.slots import PlacementRequest
+from contact_core.plugins.solving import PluginSolver
 from contact_core.pose.body import uniform_scale
 from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
+from contact_core.pose.penetration import Solids
+from contact_core.pose.problem import Limits, PoseProblem
 from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
 from contact_core.pose.terms import PoseTerm, paper_terms
 from contact_core.proposals.draft import Draft, change
-from contact_core.proposals.sliding import SlidingPatch, solve_sliding
+from contact_core.proposals.sliding import solve_sliding
+from contact_core.proposals.sliding_targets import SlidingPatch
 
 if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
@@ -50,16 +53,23 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class ProposalSettings:
-    """How to solve. solver: a name, None for the default. terms: of the objective."""
+    """How to solve. solver: a name; None leaves the choice to the plugins. terms, limits: of the problem.
+
+    solids: closed meshes by surface, in its space, whose inside is out of bounds; by default each surface that
+    does not bend is its own. Give filled bodies of what is hollow.
+    """
 
     solver: str | None = None
     options: SolveOptions | None = None
     terms: tuple[PoseTerm, ...] = paper_terms()
     progress: Progress | None = None
+    limits: Limits = "rig"
+    solids: Solids | None = None
 
     def solver_of(self, plugins: PluginManager) -> PoseSolver:
-        """The solver. Raises InvalidInput for an unknown name."""
-        return LevenbergMarquardt() if self.solver is None else plugins.get(POSE_SOLVERS, self.solver)
+        """The solver; the core's own where no plugin offers any."""
+        by_plugin = self.solver is not None or plugins.offers(POSE_SOLVERS)
+        return PluginSolver(plugins, self.solver) if by_plugin else LevenbergMarquardt()
 
 
 def settle(
@@ -75,9 +85,10 @@ def settle(
     before = after = _solved(draft, solver, problem, options, settings.progress)
     best, left_out = draft.document, dict[str, str]()
     for _ in range(rounds):
-        left_out = _place_all(draft, plugins, problem, reach)
+        left_out = _place_all(draft, plugins, problem, reach, settings.solids or {})
         again = replace(options, candidates=AGAIN)
-        solution = _solved(draft, solver, draft.problem(settings.terms), again, settings.progress)
+        moved = draft.problem(settings.terms, limits=settings.limits)
+        solution = _solved(draft, solver, moved, again, settings.progress)
         if solution.value < after.value:
             best, after = draft.document, solution
     command = change(start, best, "Settle contacts")
@@ -93,14 +104,15 @@ def slide(
     turn: float,
     penalty: float,
 ) -> Proposal:
-    """The pose and all contacts solved together: each may move on its surface within a slack (see `sliding`).
+    """The pose and all contacts solved together: each may move on its surface within a slack, and skin gets no
+    deeper into what is solid than with the contacts left alone (see `sliding`).
 
     slack: in manipulator lengths. turn: radians.
     """
     start = draft.document
     problem, options = _problem_and_options(draft, settings)
     patches, left_out = _sliding_patches(draft, problem, slack, turn, penalty)
-    slid = solve_sliding(settings.solver_of(plugins), problem, patches, options, settings.progress)
+    slid = solve_sliding(settings.solver_of(plugins), problem, patches, options, settings.progress, settings.solids)
     _raise_if_cancelled(slid.solution)
     for contact, root in slid.roots.items():
         name = start.pairs[contact].object
@@ -111,7 +123,7 @@ def slide(
 
 
 def _problem_and_options(draft: Draft, settings: ProposalSettings) -> tuple[PoseProblem, SolveOptions]:
-    problem = draft.problem(settings.terms) if draft.document.pairs else None
+    problem = draft.problem(settings.terms, limits=settings.limits) if draft.document.pairs else None
     if problem is None or not any(body.name in draft.rigs for body in problem.bodies):
         raise InvalidInput(
             "settling and sliding need contact pairs with a rig that can be posed: pair patches first."
@@ -149,7 +161,9 @@ def _bends(draft: Draft, contact: str) -> str:
     return "" if surfaces[0] in draft.rigs else f"{surfaces[0]} has no rig that is posed"
 
 
-def _place_all(draft: Draft, plugins: PluginManager, problem: PoseProblem, reach: float) -> dict[str, str]:
+def _place_all(
+    draft: Draft, plugins: PluginManager, problem: PoseProblem, reach: float, solids: Solids
+) -> dict[str, str]:
     """One round: contacts to their closest facing points; answers those that stay, with the reason."""
     left_out = {name: why for name in draft.document.pairs if (why := _bends(draft, name))}
     groups: dict[tuple[str, str], list[str]] = {}
@@ -168,6 +182,7 @@ def _place_all(draft: Draft, plugins: PluginManager, problem: PoseProblem, reach
             patch_points={name: draft.points(pair.manipulator) for name, pair in pairs.items()},
             patch_axes={name: draft.axis(pair.manipulator).points for name, pair in pairs.items()},
             options={"far": reach},
+            solids=tuple(solids.get(thing, ())),
         )
         result = plugins.get(PLACERS, PLACER).place(request)
         for name, place in result.placed.items():

@@ -58,7 +58,7 @@ def contact_pose_terms() -> list[object]:
         "contact_core.pose.terms:DistanceTerm",
         "contact_core.pose.terms:NormalTerm",
         "contact_core.pose.terms:PriorTerm",
-        "contact_builtins.terms.penetration:PenetrationTerm",
+        "contact_core.pose.penetration:PenetrationTerm",
         "contact_builtins.terms.self_collision:SelfCollisionTerm",
         "contact_builtins.terms.aims:PinTerm",
         "contact_builtins.terms.aims:LookTerm",

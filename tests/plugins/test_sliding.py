@@ -19,7 +19,8 @@ from contact_core.pose.black_box import Differentiable
 from contact_core.pose.body import Body, PairedPoints
 from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
 from contact_core.pose.problem import PoseProblem
-from contact_core.proposals.sliding import SlidingPatch, SlidingTarget, sliding_problem, solve_sliding
+from contact_core.proposals.sliding import sliding_problem, solve_sliding
+from contact_core.proposals.sliding_targets import SlidingPatch, SlidingTargets
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import differences
 
@@ -65,8 +66,8 @@ def test_targets_slide_to_the_spacing_of_the_fingers() -> None:
 def test_a_slide_is_the_exponential_map() -> None:
     """Offsets along and across the heading, the heading kept parallel and turned; the points traced from there."""
     _, (patch, _) = spread_too_far()
-    target = SlidingTarget(FLOOR, patch, np.eye(4), patch_at(0.5, 1.0)[2])
-    root = target.root(np.array([0.5, -0.25, 0.3]))
+    target = SlidingTargets(FLOOR, [patch], np.eye(4), [patch_at(0.5, 1.0)[2]])
+    root = target.roots(np.array([0.5, -0.25, 0.3]))["left"]
     assert root.point().positions(FLOOR)[0] == pytest.approx([0.6, 0.95, 0.0], abs=1e-9)
     points, normals = target.watch(patch_at(0.5, 1.0)[2])(np.array([0.5, -0.25, 0.3]))
     turn = 0.3 * patch.turn
@@ -99,9 +100,9 @@ def test_slack_is_kept_exactly() -> None:
 
 def test_refusals() -> None:
     problem, (patch, other) = spread_too_far()
-    for wrong in (replace(patch, contact="none"), replace(patch, slack=0.0), replace(patch, root=other.root)):
+    for wrong in ({"contact": "none"}, {"slack": 0.0}, {"turn": -1.0}, {"root": other.root}):
         with pytest.raises(InvalidInput) as refusal:
-            sliding_problem(problem, [wrong])
+            sliding_problem(problem, [replace(patch, **wrong)])
         assert len(str(refusal.value).split()) > 6
 
 
@@ -119,7 +120,7 @@ def test_derivatives_on_a_curved_surface(mirrored: bool) -> None:
     world = np.diag([2.0, 2.0, 2.0, 1.0])
     patch = SlidingPatch("c", shape, axis.root(), 0.2, mirrored=mirrored, unit=1.1, axis=bent)
     meant = reconstruct_patch(ball, shape, axis.root(), axis_shape=bent, mirrored=mirrored, unit=1.1).points
-    evaluate = SlidingTarget(ball, patch, world, meant).watch(meant)
+    evaluate = SlidingTargets(ball, [patch], world, [meant]).watch(meant)
     assert isinstance(evaluate, Differentiable)
     theta, step = np.array([0.31, -0.22, 0.17]), 1e-7
     for found in range(2):

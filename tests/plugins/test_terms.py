@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from contact_builtins.terms.aims import Look, LookTerm, Pin, PinTerm
-from contact_builtins.terms.penetration import PenetrationTerm, thinned
 from contact_builtins.terms.self_collision import SelfCollisionTerm
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.pose.body import Body, PairedPoints
 from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
+from contact_core.pose.penetration import PenetrationTerm, thinned
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.rig import skin
 from contact_core.pose.terms import DistanceTerm, NormalTerm, PoseTerm, PriorTerm, paper_terms
