@@ -70,37 +70,45 @@ class DistanceField:
         values = cached_arrays("distance-fields", key, make)["values"]
         return cls(low, spacing, values)
 
+    def distances(self, points: FloatArray) -> FloatArray:
+        """(k,) signed distance at points (k, 3), that of `sample` at a third of its cost."""
+        values, share, beyond = self._cells(points)
+        for axis in range(3):
+            values = _mix(values, share[:, axis])
+        return values + np.linalg.norm(beyond, axis=1)
+
     def sample(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed distance (k,) and gradient (k, 3) at points (k, 3).
 
         Outside the grid: the value at the nearest point of the grid's box plus the distance to it.
         """
-        limit = np.array(self.values.shape) - 1  # (3,) cells
-        grid = (np.asarray(points, dtype=np.float64) - self.origin) / self.spacing  # (k, 3) in cells
-        clamped = np.clip(grid, 0.0, limit)
-        cell = np.minimum(clamped.astype(np.int64), limit - 1)  # (k, 3)
-        f = clamped - cell  # (k, 3) in 0..1
-        i, j, k = cell.T
-        v = self.values
-        c00, c10 = _mix(v[i, j, k], v[i + 1, j, k], f[:, 0]), _mix(v[i, j + 1, k], v[i + 1, j + 1, k], f[:, 0])
-        c01 = _mix(v[i, j, k + 1], v[i + 1, j, k + 1], f[:, 0])
-        c11 = _mix(v[i, j + 1, k + 1], v[i + 1, j + 1, k + 1], f[:, 0])
-        near, far = _mix(c00, c10, f[:, 1]), _mix(c01, c11, f[:, 1])
-        value = _mix(near, far, f[:, 2])
-        dx = _mix(
-            _mix(v[i + 1, j, k] - v[i, j, k], v[i + 1, j + 1, k] - v[i, j + 1, k], f[:, 1]),
-            _mix(v[i + 1, j, k + 1] - v[i, j, k + 1], v[i + 1, j + 1, k + 1] - v[i, j + 1, k + 1], f[:, 1]),
-            f[:, 2],
-        )
-        gradient = np.stack([dx, _mix(c10 - c00, c11 - c01, f[:, 2]), far - near], -1) / self.spacing  # (k, 3)
-        beyond = (grid - clamped) * self.spacing  # (k, 3) vector from the box to the point
+        values, share, beyond = self._cells(points)
+        x, y, z = share.T
+        along = _mix(values, x)  # (2, 2, k)
+        across = _mix(along, y)  # (2, k)
+        slopes = _mix(_mix(values[1] - values[0], y), z), _mix(along[1] - along[0], z), across[1] - across[0]
+        value, gradient = _mix(across, z), np.stack(slopes, -1) / self.spacing  # (k,), (k, 3)
         away = np.linalg.norm(beyond, axis=1)
         outside = away > 0
         if outside.any():
             value = value + away
-            gradient = np.where(grid == clamped, gradient, 0.0)  # the clamped coordinate no longer varies
+            gradient = np.where(beyond == 0.0, gradient, 0.0)  # the clamped coordinate no longer varies
             gradient[outside] += beyond[outside] / away[outside, None]
         return value, gradient
+
+    def _cells(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of points (k, 3): values (2, 2, 2, k) at the corners of their cells, shares (k, 3) in 0..1 of the way
+        through them, and the vector (k, 3) from the grid's box to the point, 0 inside."""
+        limit = np.array(self.values.shape) - 1  # (3,) cells
+        grid = (np.asarray(points, dtype=np.float64) - self.origin) / self.spacing  # (k, 3) in cells
+        clamped = np.clip(grid, 0.0, limit)
+        cell = np.minimum(clamped.astype(np.int64), limit - 1)  # (k, 3)
+        _, rows, columns = self.values.shape
+        first = (cell[:, 0] * rows + cell[:, 1]) * columns + cell[:, 2]
+        corners = np.array([0, 1, columns, columns + 1])
+        corners = np.concatenate([corners, corners + rows * columns])  # (8,) x slowest, z fastest
+        values = self.values.ravel().take(first + corners[:, None]).reshape(2, 2, 2, len(points))
+        return values, clamped - cell, (grid - clamped) * self.spacing
 
 
 def _signed_distances(mesh: TriangleMesh, low: FloatArray, spacing: float, shape: tuple[int, ...]) -> FloatArray:
@@ -120,5 +128,6 @@ def _signed_distances(mesh: TriangleMesh, low: FloatArray, spacing: float, shape
     return (sign[source] * distance).reshape(shape)
 
 
-def _mix(a: FloatArray, b: FloatArray, t: FloatArray) -> FloatArray:
-    return a + (b - a) * t
+def _mix(ends: FloatArray, share: FloatArray) -> FloatArray:
+    """What lies a share of the way between two ends (2, ...)."""
+    return ends[0] + (ends[1] - ends[0]) * share

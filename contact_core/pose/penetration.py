@@ -123,9 +123,12 @@ class Solid:
         """(4, 4)"""
         return np.asarray(self.surface_from_joint @ np.linalg.inv(state.world[self.bone]))
 
+    def distances(self, points: FloatArray) -> FloatArray:
+        """(k,) signed distances of points (k, 3) to the nearest solid, negative inside; surface units and space."""
+        return np.asarray(np.min([field.distances(points) for field in self.fields], axis=0))
+
     def sample(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed distances (k,) of points (k, 3) to the nearest solid, negative inside, and gradients (k, 3); all
-        in surface units and space."""
+        """The same, and their gradients (k, 3), at three times the cost."""
         distance, gradient = np.full(len(points), np.inf), np.zeros((len(points), 3))
         for distance_field in self.fields:
             value, slope = distance_field.sample(points)
@@ -138,7 +141,7 @@ class Solid:
         fields, off by less than a cell, say which points are worth asking about."""
         result = np.zeros(len(points))
         for mesh, distance_field in zip(self.meshes, self.fields, strict=True):
-            near = np.flatnonzero(distance_field.sample(points)[0] < distance_field.spacing)
+            near = np.flatnonzero(distance_field.distances(points) < distance_field.spacing)
             result[near] = np.maximum(result[near], depth_inside(points[near], mesh))
         return result
 
@@ -201,12 +204,10 @@ def _touch(state: PoseState, skin: _Skin, solid: Solid) -> _Touch:
     points = state.vectors(skin.track) @ surface_from_world[:3, :3].T + surface_from_world[:3, 3]
     away = max(-float(skin.allowed.min(initial=0.0)), 0.0) / solid.scale  # vertices that have to keep a distance
     rows = np.flatnonzero(((points > solid.low - away) & (points < solid.high + away)).all(axis=1))
-    points = points[rows]
-    distance, gradient = solid.sample(points)
+    rows = rows[solid.scale * solid.distances(points[rows]) + skin.allowed[rows] < 0.0]
+    distance, gradient = solid.sample(points[rows])
     depth = solid.scale * distance + skin.allowed[rows]
-    inside = depth < 0.0
-    outward = solid.scale * gradient[inside] @ surface_from_world[:3, :3]
-    return _Touch(rows[inside], depth[inside], outward, points[inside])
+    return _Touch(rows, depth, solid.scale * gradient @ surface_from_world[:3, :3], points[rows])
 
 
 def _attached(solid: Solid, surface: FloatArray) -> Track:

@@ -43,7 +43,7 @@ class DepthBound:
         found, allowed = solids_of(problem, solids) if skins else {}, {}
         for name in skins:
             points = posed_mesh(problem, state, name).points
-            inside = [-solid.scale * solid.sample(_into(solid, state, points))[0] for solid in found.values()]
+            inside = [-solid.scale * solid.distances(_into(solid, state, points)) for solid in found.values()]
             depth = np.max(inside, axis=0, initial=-np.inf)  # (n,) below 0 outside
             deepest = max(float(depth.max(initial=0.0)), 0.0)
             wall = np.where(depth > 0.0, deepest, 0.0) - MARGIN * problem.unit

@@ -57,7 +57,7 @@ class HandPose:
 
     def distance(self, points: FloatArray) -> FloatArray:
         """(k,) signed distances of points (k, 3) to the nearest of the object and its solids."""
-        return np.asarray(np.min([field.sample(points)[0] for field in self.fields], axis=0))
+        return np.asarray(np.min([field.distances(points) for field in self.fields], axis=0))
 
     def skin(self) -> TriangleMesh:
         """The posed skin in the object's space."""

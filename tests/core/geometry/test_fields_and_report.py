@@ -33,10 +33,13 @@ def test_distance_field_gradient_is_its_derivative(seed: int) -> None:
     points = points[(np.abs(cells - np.round(cells)) > 1e-3).all(axis=1)]  # away from the kinks between cells
     step = 1e-7
     numeric = np.stack(
-        [(field.sample(points + step * e)[0] - field.sample(points - step * e)[0]) / (2 * step) for e in np.eye(3)],
+        [(field.distances(points + step * e) - field.distances(points - step * e)) / (2 * step) for e in np.eye(3)],
         axis=-1,
     )
-    np.testing.assert_allclose(field.sample(points)[1], numeric, atol=1e-6)
+    distance, gradient = field.sample(points)
+    np.testing.assert_allclose(gradient, numeric, atol=1e-6)
+    assert np.array_equal(distance, field.distances(points))
+    assert all(len(empty) == 0 for empty in field.sample(points[:0]))
 
 
 def test_distance_field_converges_and_knows_inside_from_outside() -> None:
