@@ -105,8 +105,9 @@ class CoarseSpec:
 class SolveSpec:
     """solver: a plugin's name; None leaves the choice to the plugins. start: "open" (rest pose, away from the
     object) or "coarse". penetration: weight of the depth term, 0 switches it off. limits: whether the rig's
-    limits hold. settle: rounds of re-placing each contact at its closest facing point (changes the contacts).
-    weights: of distance, normal and prior."""
+    limits hold. What changes the contacts: settle, rounds of re-placing each at its closest facing point; slide,
+    how far each may then slide with the pose, in manipulator lengths (0: not at all). weights:
+    of distance, normal and prior."""
 
     solver: str | None = None
     start: str = "open"
@@ -114,6 +115,7 @@ class SolveSpec:
     penetration: float = 5.0
     limits: bool = True
     settle: int = 0
+    slide: float = 0.0
     options: Mapping[str, Any] = field(default_factory=dict)
 
 

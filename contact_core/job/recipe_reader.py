@@ -214,6 +214,7 @@ def _solve(table: Table) -> SolveSpec:
         penetration=table.number("penetration", 5.0, at_least=0.0),
         limits=table.flag("limits", True),
         settle=table.count("settle", 0, at_most=10),
+        slide=table.number("slide", 0.0, at_least=0.0, at_most=1.0),
         options=_solve_options(table.table("options", None)),
     )
     table.done()

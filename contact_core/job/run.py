@@ -1,7 +1,8 @@
 """The job: from a recipe to painted contacts, transferred contacts, a solved pose, pictures and a report.
 
 Everything goes through a `Session`, so the document that comes out has the history of an artist's work. Targets
-come from the recipe and its placer; a solved pose never places them, unless the recipe asks to settle contacts.
+come from the recipe and its placer; a solved pose never places them, unless the recipe asks to settle or slide
+contacts.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.report import judge
 from contact_core.job.scene import away_pose, coarse_pose, posed_skin, posed_world, world_from_object
-from contact_core.job.solving import solve
-from contact_core.job.workpiece import Job, JobProgress, JobResult
+from contact_core.job.solving import move_contacts, solve
+from contact_core.job.workpiece import HAND, OBJECT, Job, JobProgress, JobResult
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import PLACERS
 from contact_core.plugins.slots import PlacementRequest, PlacementResult
@@ -32,8 +33,6 @@ from contact_core.pose.bones import bone_segments
 from contact_core.pose.rig import Pose
 from contact_core.session import Session
 from contact_core.whole_set import check_writable
-
-HAND, OBJECT = "manipulator", "object"  # names of the two surfaces in the document
 
 
 def run_recipe(
@@ -166,22 +165,11 @@ def _start(job: Job) -> tuple[Pose, float]:
 
 def _solve(job: Job, plugins: PluginManager) -> None:
     with job.stage("solve", 0.45, "Solving the pose"):
-        job.solution, job.pose = solve(job, plugins)
-        for _ in range(job.recipe.solve.settle):
-            _settle(job, plugins)
-            job.solution, job.pose = solve(job, plugins, again=True)
-        job.session.set_pose(HAND, job.pose, title="Solve")
+        solve(job, plugins)
+        move_contacts(job, plugins)
     job.tell(0.7, "Measuring")
     job.metrics = measure(posed_scene(job, job.pose))
     job.verdict = judge(job.metrics, job.placement.left_out, job.recipe.accept)
-
-
-def _settle(job: Job, plugins: PluginManager) -> None:
-    """Each contact to the closest facing point of the solved pose: the recipe asked for it."""
-    names = list(job.session.document.pairs)
-    settled = place_from(job, plugins, names, "from pose", job.pose, {"far": 0.2})
-    for name, place in settled.placed.items():
-        job.session.place(target(name), place.root, direction=place.direction)
 
 
 def posed_scene(job: Job, pose: Pose) -> PosedScene:

@@ -1,69 +1,108 @@
-"""The pose problem of a job, and the plugin that solves it."""
+"""The pose problem of a job, the plugin that solves it, and contacts that move with the pose."""
 
 from __future__ import annotations
 
+from contact_core.edit.pose_problem import pose_problem as problem_of_pairs
 from contact_core.errors import Cancelled
-from contact_core.job.workpiece import Job
+from contact_core.job.workpiece import HAND, OBJECT, Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_TERMS
 from contact_core.plugins.solving import solve_by_plugin
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.problem import PoseProblem
+from contact_core.pose.body import Body
+from contact_core.pose.problem import Limits, PoseProblem
 from contact_core.pose.rig import Pose
-from contact_core.pose.solver import Iteration, PoseSolution, SolveOptions, SolveStatus
+from contact_core.pose.solver import Iteration, PoseSolution, Progress, SolveOptions, SolveStatus
 from contact_core.pose.terms import PoseTerm, paper_terms
+from contact_core.proposals.draft import Draft
+from contact_core.proposals.proposal import AGAIN, Proposal, ProposalSettings, settle, slide
 
 
-def solve(job: Job, plugins: PluginManager, *, again: bool = False) -> tuple[PoseSolution, Pose]:
-    """Pose the manipulator by the job's pairs; `again` goes on from the pose found before.
+def solve(job: Job, plugins: PluginManager) -> None:
+    """Pose the manipulator by the job's pairs. Raises Cancelled when the user stops it, InvalidInput for wrong
+    settings."""
+    problem, options = pose_problem(job, plugins, job.start), _options(job)
+    solution = solve_by_plugin(problem, plugins, job.recipe.solve.solver, options, _progress(job, options))
+    if solution.status is SolveStatus.CANCELLED:
+        raise Cancelled("the job was cancelled; nothing was written.")
+    _take(job, solution)
+    job.session.set_pose(HAND, job.pose, title="Solve")
 
-    Raises Cancelled when the user stops it, InvalidInput for wrong settings.
-    """
-    problem = pose_problem(job, plugins, job.pose if again else job.start)
+
+def move_contacts(job: Job, plugins: PluginManager) -> None:
+    """Settle contacts, then let them slide, where the recipe asks for it: proposals, accepted as they come."""
+    spec, options = job.recipe.solve, _options(job, AGAIN)
+    settings = ProposalSettings(
+        solver=spec.solver,
+        options=options,
+        terms=_terms(job, plugins),
+        progress=_progress(job, options),
+        limits=_limits(job),
+        solids={OBJECT: job.solids} if job.solids else {},
+    )
+    if spec.settle:
+        _accept(job, settle(_draft(job), plugins, job.session.revision, settings, rounds=spec.settle))
+    if spec.slide:
+        _accept(job, slide(_draft(job), plugins, job.session.revision, settings, slack=spec.slide))
+
+
+def _draft(job: Job) -> Draft:
+    return Draft(job.session.document, job.session.derived, job.session.rigs)
+
+
+def _accept(job: Job, proposal: Proposal) -> None:
+    job.session.accept(proposal)
+    job.notes += [f"{name} stays where it is: {why}." for name, why in proposal.left_out.items()]
+    _take(job, proposal.after)
+
+
+def _take(job: Job, solution: PoseSolution) -> None:
+    job.solution, job.pose = solution, solution.poses[HAND]
+
+
+def _options(job: Job, candidates: tuple[str, ...] | None = None) -> SolveOptions:
+    """The recipe's options; candidates: in place of the recipe's."""
     wanted = dict(job.recipe.solve.options)
-    candidates = tuple(wanted.pop("candidates", SolveOptions().candidates))
-    options = SolveOptions(
+    own = tuple(wanted.pop("candidates", SolveOptions().candidates))
+    return SolveOptions(
         max_iterations=wanted.pop("max_iterations", 200),
         tolerance=wanted.pop("tolerance", 1e-5),
-        candidates=("current",) if again else candidates,
+        candidates=candidates or own,
         seed=wanted.pop("seed", 0),
         more=wanted,
     )
-    most = options.max_iterations
 
+
+def _progress(job: Job, options: SolveOptions) -> Progress:
     def seen(iteration: Iteration) -> bool:
-        share = min(iteration.number / most, 1.0)
+        share = min(iteration.number / options.max_iterations, 1.0)
         if job.progress is None:
             return False
         return job.progress(0.45 + 0.2 * share, f"Solving the pose, iteration {iteration.number}") is False
 
-    solution = solve_by_plugin(problem, plugins, job.recipe.solve.solver, options, seen)
-    if solution.status is SolveStatus.CANCELLED:
-        raise Cancelled("the job was cancelled; nothing was written.")
-    return solution, solution.poses[job.manipulator.name]
+    return seen
 
 
 def pose_problem(job: Job, plugins: PluginManager, start: Pose) -> PoseProblem:
     """The job's pairs, the paper's terms in the recipe's weights, and the penetration term where it is on."""
+    bodies = {
+        HAND: Body.skinned(job.rig, name=HAND, pose=start),
+        OBJECT: Body.rigid(OBJECT, job.object.mesh, world_from_surface=job.placed),
+    }
+    pairs = job.session.pairs()
+    return problem_of_pairs(pairs, bodies.__getitem__, _terms(job, plugins), limits=_limits(job))
+
+
+def _terms(job: Job, plugins: PluginManager) -> tuple[PoseTerm, ...]:
     spec = job.recipe.solve
-    hand, thing = job.manipulator.name, job.object.name
-    terms: list[PoseTerm] = list(paper_terms(*spec.weights))
+    terms = paper_terms(*spec.weights)
     if spec.penetration > 0.0 and job.solids:
         term = plugins.get(POSE_TERMS, "penetration")
-        terms.append(_made(term)(spec.penetration, solids={thing: job.solids}))
-    contacts = tuple(
-        PairedPoints(pair.pair.name, hand, pair.manipulator_points, thing, pair.object_points, pair.weights)
-        for pair in job.session.pairs()
-    )
-    return PoseProblem(
-        bodies=(
-            Body.skinned(job.rig, name=hand, pose=start),
-            Body.rigid(thing, job.object.mesh, world_from_surface=job.placed),
-        ),
-        contacts=contacts,
-        terms=tuple(terms),
-        limits="rig" if spec.limits else "none",
-    )
+        terms += (_made(term)(spec.penetration, solids={OBJECT: job.solids}),)
+    return terms
+
+
+def _limits(job: Job) -> Limits:
+    return "rig" if job.recipe.solve.limits else "none"
 
 
 def _made(term: object) -> type:

@@ -25,6 +25,8 @@ from contact_core.session import Session
 # Called with a fraction 0..1 and a text; False cancels the job.
 JobProgress = Callable[[float, str], bool | None]
 
+HAND, OBJECT = "manipulator", "object"  # names of the two surfaces in the document
+
 
 @dataclass
 class Job:

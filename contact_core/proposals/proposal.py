@@ -23,6 +23,7 @@ from contact_core.pose.penetration import Solids
 from contact_core.pose.problem import Limits, PoseProblem
 from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
 from contact_core.pose.terms import PoseTerm, paper_terms
+from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 from contact_core.proposals.draft import Draft, change
 from contact_core.proposals.sliding import solve_sliding
 from contact_core.proposals.sliding_targets import SlidingPatch
@@ -73,7 +74,12 @@ class ProposalSettings:
 
 
 def settle(
-    draft: Draft, plugins: PluginManager, revision: int, settings: ProposalSettings, rounds: int, reach: float
+    draft: Draft,
+    plugins: PluginManager,
+    revision: int,
+    settings: ProposalSettings,
+    rounds: int = ROUNDS,
+    reach: float = REACH,
 ) -> Proposal:
     """Rounds of: every contact to the closest point that faces it on its object, then solve again.
 
@@ -100,9 +106,9 @@ def slide(
     plugins: PluginManager,
     revision: int,
     settings: ProposalSettings,
-    slack: float,
-    turn: float,
-    penalty: float,
+    slack: float = SLACK,
+    turn: float = TURN,
+    penalty: float = PENALTY,
 ) -> Proposal:
     """The pose and all contacts solved together: each may move on its surface within a slack, and skin gets no
     deeper into what is solid than with the contacts left alone (see `sliding`).

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from contact_core.edit.verbs import SurfaceVerbs, Verbs
 from contact_core.errors import CommandRejected
+from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 
 if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
@@ -32,7 +31,9 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
         """Tell listeners of a preview; None: back to the document."""
         raise NotImplementedError
 
-    def settle(self, *, rounds: int = 3, reach: float = 0.2, settings: ProposalSettings | None = None) -> Proposal:
+    def settle(
+        self, *, rounds: int = ROUNDS, reach: float = REACH, settings: ProposalSettings | None = None
+    ) -> Proposal:
         """Propose every contact at the closest point of its object that faces it, the pose solved again, in rounds.
 
         Needs a placer called "from pose". reach: contacts farther away than this stay, in manipulator lengths.
@@ -47,9 +48,9 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
     def slide(
         self,
         *,
-        slack: float = 0.1,
-        turn: float = np.pi / 4.0,
-        penalty: float = 0.1,
+        slack: float = SLACK,
+        turn: float = TURN,
+        penalty: float = PENALTY,
         settings: ProposalSettings | None = None,
     ) -> Proposal:
         """Propose pose and contacts solved together, each contact free within its slack on its surface.
