@@ -17,6 +17,7 @@ import numpy as np
 
 from contact_blender import mesh as meshes
 from contact_blender.freedom import freedom_of
+from contact_blender.weights import group_weights, influences
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.triangulate import triangulate
@@ -67,10 +68,12 @@ def armature_of(scene_object: Any) -> Any:
 
 
 def read_skeleton(armature: Any) -> Skeleton:
-    """The bones of an armature. Raises InvalidInput while it is in Edit Mode: its rest is then in flux."""
+    """The bones of an armature. Raises InvalidInput where there are none, and in Edit Mode: the rest is in flux."""
     if armature.mode == "EDIT":
         raise InvalidInput(f"{armature.name} is in Edit Mode: leave it first, its bones are still being edited.")
     bones = _parents_first(armature.data.bones)
+    if not bones:
+        raise InvalidInput(f"{armature.name} has no bones, so nothing of it can be posed.")
     index = {bone.name: place for place, bone in enumerate(bones)}
     parents = np.array([index[bone.parent.name] if bone.parent else -1 for bone in bones], np.int64)  # (j,)
     world = np.array([bone.matrix_local for bone in bones], float).reshape(-1, 4, 4)  # armature space
@@ -161,29 +164,17 @@ def _shaped_points(scene_object: Any, points: FloatArray) -> FloatArray:
 
 def _group_weights(scene_object: Any, group: str) -> FloatArray:
     """(n,) weights of a vertex group; all ones for no group."""
-    vertices = scene_object.data.vertices
     if not group or group not in scene_object.vertex_groups:
-        return np.ones(len(vertices))
-    wanted = scene_object.vertex_groups[group].index
-    return np.array([sum(e.weight for e in vertex.groups if e.group == wanted) for vertex in vertices], float)
+        return np.ones(len(scene_object.data.vertices))
+    (weights,) = group_weights(scene_object.data, [scene_object.vertex_groups[group].index])
+    return weights
 
 
 def _influences(cage: Any, scene_object: Any, armature: Any, skeleton: Skeleton) -> tuple[IntArray, FloatArray]:
     """(n, K) joints and weights of the groups that have a deforming bone; unused places weigh 0."""
     joint = {name: place for place, name in enumerate(skeleton.joints) if armature.data.bones[name].use_deform}
-    joint_of_group = {group.index: joint[group.name] for group in scene_object.vertex_groups if group.name in joint}
-    rows = [
-        sorted(
-            (joint_of_group[e.group], e.weight) for e in vertex.groups if e.group in joint_of_group and e.weight > 0
-        )
-        for vertex in cage.vertices
-    ]
-    most = max((len(row) for row in rows), default=0) or 1
-    joints, weights = np.zeros((len(rows), most), np.int64), np.zeros((len(rows), most))
-    for place, row in enumerate(rows):
-        for k, (bone, weight) in enumerate(row):
-            joints[place, k], weights[place, k] = bone, weight
-    return joints, weights
+    groups = scene_object.vertex_groups
+    return influences(cage, {group.index: joint[group.name] for group in groups if group.name in joint})
 
 
 def _normalised(joints: IntArray, weights: FloatArray, unmoved: int) -> tuple[IntArray, FloatArray, list[str]]:

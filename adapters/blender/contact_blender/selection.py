@@ -8,6 +8,7 @@ import bmesh
 import numpy as np
 
 from contact_blender.mesh import cage
+from contact_blender.weights import group_weights
 from contact_core.arrays import IntArray
 from contact_core.errors import InvalidInput
 
@@ -28,10 +29,8 @@ def vertices(scene_object: Any, selection: str) -> IntArray:
     if selection in scene_object.vertex_groups:
         wanted = scene_object.vertex_groups[selection].index
         with cage(scene_object) as mesh:
-            weighted = [
-                any(e.group == wanted and e.weight > 0.0 for e in vertex.groups) for vertex in mesh.vertices
-            ]
-        return np.flatnonzero(weighted)
+            (weights,) = group_weights(mesh, [wanted])
+        return np.flatnonzero(weights > 0.0)
     if selection in _flags(scene_object):
         return _flagged(scene_object, selection)
     there = ", ".join(map(repr, names(scene_object))) or "nothing"

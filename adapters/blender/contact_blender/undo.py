@@ -1,7 +1,8 @@
 """Blender's undo, in steps: it is the authority for the scene, and the core's history follows it by revision.
 
 Measured on 4.2 to 5.2: pushing, undoing and redoing work without a window; nothing can be undone before a first
-push; operators called from Python push no step; in a mesh's Edit Mode a step holds that mesh and nothing else.
+push; operators called from Python push no step; in a mesh's Edit Mode, in Particle Edit and (before 5.2) in Texture
+Paint a step holds what is being edited and nothing else.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from typing import Any
 import bpy
 
 from contact_core.errors import InvalidInput
+
+_WHOLE_SCENE = frozenset(("OBJECT", "POSE", "SCULPT", "PAINT_WEIGHT", "PAINT_VERTEX"))  # what a step holds there
 
 
 class UndoBridge:
@@ -29,7 +32,7 @@ class UndoBridge:
     def step(self, label: str) -> Iterator[None]:
         """All that is written inside becomes one step of Blender's undo; steps inside a step join it."""
         if self._depth == 0:
-            _refuse_edit_mode(label)
+            _refuse_partial_modes(label)
             self._ensure_base()
         self._depth += 1
         already = len(self._undo_of_writes)
@@ -108,10 +111,12 @@ def _handlers() -> tuple[Any, Any]:
     return bpy.app.handlers.undo_post, bpy.app.handlers.redo_post
 
 
-def _refuse_edit_mode(label: str) -> None:
+def _refuse_partial_modes(label: str) -> None:
     mode = str(bpy.context.mode)
-    if mode.startswith("EDIT"):
-        raise InvalidInput(
-            f"{label!r} waits until you leave Edit Mode ({mode.lower()}): Blender's undo there remembers only the"
-            " data being edited, so the step could not be undone."
-        )
+    if mode in _WHOLE_SCENE:
+        return
+    name = "Edit Mode" if mode.startswith("EDIT") else mode.replace("_", " ").title()
+    raise InvalidInput(
+        f"{label!r} waits until you leave {name} ({mode.lower()}): Blender's undo there remembers only the"
+        " data being edited, so the step could not be undone."
+    )

@@ -150,6 +150,35 @@ def test_in_edit_mode_a_step_waits(bpy: Any, torus: Any) -> None:
     paint(session, 4)
 
 
+@pytest.mark.parametrize(
+    "mode",
+    ["OBJECT", "POSE", "SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT", "PARTICLE_EDIT", "EDIT"],
+)
+def test_in_every_mode_a_step_can_be_undone_or_is_refused(bpy: Any, torus: Any, mode: str) -> None:
+    """Blender's undo holds the whole scene in some modes, and in others only what is being edited."""
+    made = bpy.data.objects["arm"]
+    made.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    made.particle_systems[0].settings.type = "HAIR"
+    bpy.context.view_layer.objects.active = made.parent if mode == "POSE" else made
+    rig = torus.read_rig("arm").rig
+    with torus.step("before"):
+        torus.store_document(StoredDocument(b"0", 1, VERSION))
+    bpy.ops.object.mode_set(mode=mode)
+    try:
+        for number in (1, 2):
+            with torus.step("in the mode"):
+                torus.store_document(StoredDocument(str(number).encode(), number + 1, VERSION))
+                torus.write_pose("arm", bent(rig, number), float(number))
+    except InvalidInput as error:
+        assert mode in ("TEXTURE_PAINT", "PARTICLE_EDIT", "EDIT") and "waits until you leave" in str(error)
+        assert torus.stored_document().data == b"0" and torus.pose_keys("arm") == ()
+    else:
+        for way, wanted in (("undo", 1), ("undo", 0), ("redo", 1), ("redo", 2)):
+            assert getattr(torus, way)() and torus.stored_document().data == str(wanted).encode()
+            assert torus.pose_keys("arm") == tuple(map(float, range(1, wanted + 1)))
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def test_one_command_is_one_step_of_blender(bpy: Any, torus: Any) -> None:
     """Painting, turning and a macro each go and come with one undo and redo of Blender itself."""
     session = open_session(torus)

@@ -98,6 +98,46 @@ def test_in_edit_mode_the_rig_has_the_edits_so_far(bpy: Any, arm: Any) -> None:
     assert after.skin_weights[7].max() < 0.7
 
 
+@pytest.mark.parametrize("editing", [False, True], ids=["object mode", "edit mode"])
+def test_weights_are_those_that_blender_gives_one_by_one(bpy: Any, scenes: Any, empty: Any, editing: bool) -> None:
+    """For more groups than are read at a time, with names of every kind and an attribute called like a group."""
+    from contact_blender.mesh import cage
+    from contact_blender.weights import group_weights, influences
+
+    random = np.random.default_rng(4)
+    count, groups = 200, 37
+    made = scenes.mesh_object("blob", random.normal(size=(count, 3)), [3], [0, 1, 2])
+    for number in range(groups):
+        group = made.vertex_groups.new(name=f'größe "{number}".L' if number % 2 else f"bone {number}")
+        for vertex in random.choice(count, int(random.integers(0, 60)), replace=False).tolist():
+            group.add([vertex], float(random.uniform() * (random.uniform() < 0.9)), "REPLACE")
+    made.data.attributes.new(".contact_weights 3", "FLOAT", "POINT")
+    made.shape_key_add(name="Basis")
+    made.shape_key_add(name="Other").driver_add("value").driver.expression = "0.5"
+    there = [{e.group: e.weight for e in vertex.groups} for vertex in made.data.vertices]
+    if editing:
+        bpy.context.view_layer.objects.active = made
+        bpy.ops.object.mode_set(mode="EDIT")
+    blocks = ("objects", "meshes", "scenes", "node_groups", "shape_keys", "actions")
+    before = [getattr(bpy.data, name).keys() for name in blocks]
+    joint_of_group = {
+        int(g): int(j) for g, j in zip(random.permutation(groups)[:30], range(29, -1, -1), strict=True)
+    }
+    with cage(made) as mesh:
+        weights = np.array(list(group_weights(mesh, range(groups))))
+        joints, values = influences(mesh, joint_of_group)
+    assert [getattr(bpy.data, name).keys() for name in blocks] == before
+    wanted = np.array([[row.get(group, 0.0) for row in there] for group in range(groups)])
+    np.testing.assert_array_equal(weights, wanted)
+    for vertex, row in enumerate(there):
+        pairs = sorted((joint_of_group[g], w) for g, w in row.items() if g in joint_of_group and w > 0.0)
+        used = values[vertex] > 0.0
+        assert [*map(tuple, np.c_[joints[vertex, used], values[vertex, used]].tolist())] == pairs
+        assert not joints[vertex, ~used].any()
+    if editing:
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def test_a_connected_bone_stays_where_its_parent_ends(bpy: Any, arm: Any) -> None:
     """Blender ignores the location of a connected bone, and so does the pose that is read."""
     armature = bpy.data.objects["arm"].parent
@@ -327,6 +367,13 @@ def test_what_cannot_be_a_rig_is_refused_in_words(bpy: Any, arm: Any) -> None:
     with pytest.raises(InvalidInput, match="Edit Mode"):
         arm.read_rig("arm")
     bpy.ops.object.mode_set(mode="OBJECT")
+    bare = bpy.data.objects.new("bare", bpy.data.armatures.new("bare"))
+    bpy.context.scene.collection.objects.link(bare)
+    bpy.data.objects["arm"].modifiers["Armature"].object = bare
+    for call in (arm.read_rig, arm.read_pose):
+        with pytest.raises(InvalidInput, match="bare has no bones"):
+            call("arm")
+    bpy.data.objects["arm"].modifiers["Armature"].object = armature
     stretched = replace(arm_rig(), bind_world=arm_rig().bind_world @ np.diag([2.0, 2.0, 2.0, 1.0]))
     with pytest.raises(InvalidInput, match="scaled where its skin is bound"):
         arm.add(Asset("bad", stretched.surface, stretched))
