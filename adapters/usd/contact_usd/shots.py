@@ -11,9 +11,9 @@ import numpy as np
 
 from contact_core.document.asset import Asset
 from contact_core.document.document import ContactDocument, Surface
-from contact_core.edit.recovery import open_file
+from contact_core.edit.pose_problem import pose_problem
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.pose.body import Body, PairedPoints
+from contact_core.pose.body import Body
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.sequence import SequenceSolution, solve_sequence
 from contact_core.pose.solver import PoseSolver
@@ -46,7 +46,7 @@ class Shot:
             for surface in shot.session.document.surfaces.values():
                 shot.bind(surface, wanted or {})
         except BaseException:
-            shot.session.close()
+            shot.__exit__()
             raise
         return shot
 
@@ -55,6 +55,7 @@ class Shot:
 
     def __exit__(self, *_: object) -> None:
         self.session.close()
+        self.session.host = None  # the stage ends now, whenever Python finds time to free the session
 
     def bind(self, surface: Surface, wanted: Mapping[str, str]) -> None:
         """Give the session the mesh behind a surface, where it stands now. Raises InvalidInput."""
@@ -103,18 +104,18 @@ class Shot:
 
 
 def read_contacts(path: Path) -> ContactDocument:
-    """The document in a stage or in a document file. Raises FileRefused where there is none."""
-    if path.suffix.lower() not in SUFFIXES:
-        opened = open_file(path)
-        if opened.journal is not None:
-            opened.journal.close(record=True)
-        if opened.lock is not None:
-            opened.lock.release()
-        return opened.history.document
-    with Session(host=UsdHost(path), discover=False) as session:
-        if not session.document.patches:
-            raise FileRefused(f"{path} holds no contacts.")
-        return session.document
+    """The document in a stage or in a document file. Raises FileRefused where there is none, or it is empty."""
+    if path.suffix.lower() in SUFFIXES:
+        with Shot(host := UsdHost(path), Session(host=host, discover=False)) as shot:
+            document = shot.session.document
+    elif path.is_file():
+        with Session.open(path) as session:  # with what an interrupted journal holds, which stays there unsaved
+            document = session.document
+    else:
+        raise FileRefused(f"there is no file {path}.")
+    if not document.patches:
+        raise FileRefused(f"{path} holds no contacts.")
+    return document
 
 
 def transfer(
@@ -181,29 +182,16 @@ def _write(shot: Shot, times: Sequence[float | None], solved: SequenceSolution) 
 
 def _problem(shot: Shot, frame: float | None) -> PoseProblem:
     """The document's pairs, with everything where the stage has it at a frame."""
-    pairs = shot.session.pairs()
-    names = dict.fromkeys(name for pair in pairs for name in (pair.manipulator_surface, pair.object_surface))
-    bodies = []
-    for name in names:
+
+    def body_of(name: str) -> Body:
         placement = shot.host.placement(shot.prims[name], frame)
         rig = shot.session.rigs.get(name)
         if rig is None:
-            bodies.append(Body.rigid(name, shot.session.meshes[name], world_from_surface=placement))
-        else:
-            pose = shot.host.read_pose(shot.prims[name], frame)
-            bodies.append(Body.skinned(rig, name=name, pose=pose, world_from_rig=placement))
-    contacts_ = tuple(
-        PairedPoints(
-            pair.pair.name,
-            pair.manipulator_surface,
-            pair.manipulator_points,
-            pair.object_surface,
-            pair.object_points,
-            pair.weights,
-        )
-        for pair in pairs
-    )
-    return PoseProblem(bodies=tuple(bodies), contacts=contacts_)
+            return Body.rigid(name, shot.session.meshes[name], world_from_surface=placement)
+        pose = shot.host.read_pose(shot.prims[name], frame)
+        return Body.skinned(rig, name=name, pose=pose, world_from_rig=placement)
+
+    return pose_problem(shot.session.pairs(), body_of)
 
 
 def _frame_facts(frame: float | None, k: int, solved: SequenceSolution) -> dict[str, object]:

@@ -146,15 +146,18 @@ def test_export_writes_files_and_samples(sequence: Path, capsys: pytest.CaptureF
         (["inspect", "no_such.usda"], "no_such.usda is no USD file"),
         (["solve", "asset.usda"], "no contact pairs"),
         (["transfer", "asset.usda", "shot010.usda"], "no contacts"),
+        (["transfer", "sub/no_such.contact", "shot010.usda"], "there is no file"),
         (["transfer", "contacts.usda", "shot010.usda", "--surface", "arm=/nowhere"], "/nowhere"),
     ],
 )
 def test_refusals_are_sentences(
     arguments: list[str], words: str, sequence: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = main(["usd", *(str(sequence / a) if a.endswith(".usda") else a for a in arguments)])
+    there = sorted(sequence.rglob("*"))
+    code = main(["usd", *(str(sequence / a) if a.endswith((".usda", ".contact")) else a for a in arguments)])
     said = capsys.readouterr()
     assert code in (1, 2) and words in said.out + said.err
+    assert sorted(sequence.rglob("*")) == there  # and nothing is written
 
 
 def test_without_pxr_it_says_what_to_install(
