@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
+from contact_core.arrays import FloatArray, frozen
 from contact_core.contact.placement import Root
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
@@ -16,7 +16,7 @@ from contact_core.geometry.tangent import direction_to_heading, heading_to_direc
 
 def reflected(vectors: FloatArray, normal: Any, offset: float = 0.0) -> FloatArray:
     """Points or (with offset 0) directions (k, 3) reflected in the plane of points x with normal . x = offset."""
-    n = np.asarray(normal, dtype=float).reshape(3)
+    n = frozen(normal, np.float64, (3,), "the normal of a mirror plane")
     length = float(np.linalg.norm(n))
     if not 0.0 < length < np.inf:
         raise InvalidInput(f"the normal of a mirror plane is a direction, but {n.tolist()} came.")

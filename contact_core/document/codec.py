@@ -22,6 +22,7 @@ from contact_core.document.frozen_map import FrozenMap
 from contact_core.errors import ContactError, FileRefused
 
 MAX_ARRAY = 50_000_000  # numbers in one array: beyond any patch, below any memory bomb
+MAX_DEPTH = 100  # levels of free JSON data: writing and reading go a few calls deep for each
 ROW = 12  # numbers on a line of the written file
 
 
@@ -61,16 +62,25 @@ def from_json(annotation: Any, data: Any, where: str = "value") -> Any:
         raise FileRefused(f"{where} does not fit: {error}") from error
 
 
-def freeze_json(data: Any) -> Any:
-    """JSON data as an immutable value: objects become FrozenMap, lists tuples. Raises FileRefused."""
-    if data is None or isinstance(data, (bool, int, str)):
+def freeze_json(data: Any, depth: int = 0) -> Any:
+    """JSON data as an immutable value: objects become FrozenMap, lists tuples. Raises FileRefused.
+
+    Whole numbers of 64 bits and MAX_DEPTH levels, so that whatever can be held can be written and read again.
+    """
+    if data is None or isinstance(data, (bool, str)):
+        return data
+    if isinstance(data, int):
+        if not -(1 << 63) <= data < 1 << 63:
+            raise FileRefused("JSON data holds whole numbers of at most 64 bits, but a larger one came.")
         return data
     if isinstance(data, float):
         return _finite(data, "JSON data")
+    if depth >= MAX_DEPTH:
+        raise FileRefused(f"JSON data holds at most {MAX_DEPTH} levels of lists and objects, but more came.")
     if isinstance(data, Mapping):
-        return FrozenMap({_text(key, "a key"): freeze_json(item) for key, item in data.items()})
+        return FrozenMap({_text(key, "a key"): freeze_json(item, depth + 1) for key, item in data.items()})
     if isinstance(data, (list, tuple)):
-        return tuple(freeze_json(item) for item in data)
+        return tuple(freeze_json(item, depth + 1) for item in data)
     raise FileRefused(f"JSON data holds numbers, texts, lists and objects, but {type(data).__name__} came.")
 
 

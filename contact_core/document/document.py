@@ -78,8 +78,7 @@ class Patch:
 
     def __post_init__(self) -> None:
         check_name(self.name, "a patch")
-        if len(self.color) != 3 or not all(0.0 <= c <= 1.0 for c in self.color):
-            raise InvalidInput(f"a colour is three numbers in 0..1, but {self.color} came.")
+        object.__setattr__(self, "color", _checked_color(self.color))
         if not (0.0 < self.along < np.inf and 0.0 < self.spread < np.inf):
             raise InvalidInput(f"along and spread are positive factors, but {self.along} and {self.spread} came.")
 
@@ -197,6 +196,16 @@ def named(items: Mapping[str, T], name: str, kind: str) -> T:
         near = difflib.get_close_matches(name, items, n=3) or sorted(items)[:5]
         there = f"near names: {', '.join(near)}" if near else f"the document has no {kind} at all"
         raise CommandRejected(f"there is no {kind} {name!r}; {there}.") from None
+
+
+def _checked_color(color: Any) -> Color:
+    try:
+        r, g, b = (float(number) for number in color)
+    except (TypeError, ValueError):
+        raise InvalidInput(f"a colour is three numbers in 0..1, but {str(color)[:60]!r} came.") from None
+    if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
+        raise InvalidInput(f"a colour is three numbers in 0..1, but {color} came.")
+    return r, g, b
 
 
 def check_name(name: str, kind: str) -> None:

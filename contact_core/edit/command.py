@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
-from contact_core.document.codec import from_json, to_json
+from contact_core.document.codec import MAX_DEPTH, from_json, to_json
 from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected, ContactError, FileRefused, InvalidInput
 
@@ -93,8 +93,10 @@ def command_to_json(command: Command) -> dict[str, Any]:
     return {"command": command.json_id, **to_json(command)}
 
 
-def command_from_json(data: Any) -> Command:
+def command_from_json(data: Any, depth: int = 0) -> Command:
     """The command that data stands for. Raises FileRefused for unknown kinds and fields that do not fit."""
+    if depth > MAX_DEPTH:
+        raise FileRefused(f"groups of commands lie at most {MAX_DEPTH} deep within one another, but more came.")
     if not isinstance(data, Mapping):
         raise FileRefused(f"a command is an object, but {str(data)[:60]!r} came.")
     fields = dict(data)
@@ -103,7 +105,7 @@ def command_from_json(data: Any) -> Command:
         title, parts = fields.get("title"), fields.get("commands")
         if not isinstance(title, str) or not isinstance(parts, list):
             raise FileRefused("a group of commands needs a title and a list of commands.")
-        return Macro(title, tuple(command_from_json(part) for part in parts))
+        return Macro(title, tuple(command_from_json(part, depth + 1) for part in parts))
     cls = _REGISTRY.get(json_id) if isinstance(json_id, str) else None
     if cls is None:
         raise FileRefused(f"no command is called {json_id!r}: the plugin that brings it is absent, or it is newer.")

@@ -51,10 +51,25 @@ class Derived:
 
     def root(self, document: ContactDocument, name: str) -> Root:
         """Where the axis of a patch starts, for a child as its parent's axis leads there."""
+        self._trace_ancestors(document, name)
         return self._root_and_cut(document, name)[0]
 
     def axis(self, document: ContactDocument, name: str) -> Axis:
         """The axis of a patch on its surface."""
+        self._trace_ancestors(document, name)
+        return self._axis(document, name)
+
+    def _trace_ancestors(self, document: ContactDocument, name: str) -> None:
+        """Those not traced yet, from the top down: a child finds its parent's axis, however deep the tree is."""
+        missing: list[str] = []
+        for ancestor in document.ancestors(name):
+            if ("axis", self._axis_key(document, ancestor)) in self._kept:
+                break
+            missing.append(ancestor)
+        for ancestor in reversed(missing):
+            self._axis(document, ancestor)
+
+    def _axis(self, document: ContactDocument, name: str) -> Axis:
         patch = document.patch(name)
         shape = document.effective_axis(name)
 
@@ -96,7 +111,7 @@ class Derived:
 
     def _linked_root(self, document: ContactDocument, name: str, link: Link) -> tuple[Root, float]:
         patch = document.patch(name)
-        mesh, parent = self.mesh(document, patch.surface), self.axis(document, link.parent)
+        mesh, parent = self.mesh(document, patch.surface), self._axis(document, link.parent)
         point, tangent, cut = follow_link(mesh, parent, link)
         root, cut_off = root_from_point(
             mesh,
@@ -110,11 +125,9 @@ class Derived:
         return root, cut + cut_off + float(parent.remaining[link.parent_point])
 
     def _axis_key(self, document: ContactDocument, name: str) -> Hashable:
-        """All that the axis of a patch depends on, by value."""
-        placement = document.patch(name).placement
-        if isinstance(placement, Link):
-            return self._axis_key(document, placement.parent), placement, self._shape_key(document, name)
-        return placement, self._shape_key(document, name)
+        """All that the axis of a patch depends on, by value: its own placement and shape, and those above it."""
+        line = (name, *document.ancestors(name))
+        return tuple((document.patch(each).placement, self._shape_key(document, each)) for each in line)
 
     def _shape_key(self, document: ContactDocument, name: str) -> Hashable:
         patch = document.patch(name)

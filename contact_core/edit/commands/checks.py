@@ -45,6 +45,18 @@ def check_placement(document: ContactDocument, patch: Patch, placement: Placemen
             raise CommandRejected(f"the axis of {name!r} has {count} points, but point {point} came.")
 
 
+def check_links(document: ContactDocument) -> None:
+    """No link points past an axis, as one that became shorter would leave it."""
+    for patch in document.patches.values():
+        link = patch.placement
+        if not isinstance(link, Link):
+            continue
+        parent_points = document.shape_of(link.parent).axis.point_count
+        own_points = document.shapes[patch.shape].axis.point_count
+        if link.parent_point >= parent_points or link.own_point >= own_points:
+            raise CommandRejected(f"the new axis is too short for the link of {patch.name!r}; link it anew.")
+
+
 def place_all(document: ContactDocument, placements: NamedPlacements) -> ContactDocument:
     """Put every named patch at its new placement, checked one after the other."""
     for name, placement in placements:

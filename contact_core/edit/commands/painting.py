@@ -16,6 +16,7 @@ from contact_core.edit.commands.checks import (
     NamedPlacements,
     add_patches,
     check_free,
+    check_links,
     place_all,
     without_unused_shapes,
 )
@@ -115,18 +116,8 @@ class Reshape(BaseCommand):
             turned = [patch for patch in document.patches.values() if patch.shape == key and patch.turns]
             document = document.with_patches(*(replace(patch, turns=()) for patch in turned))
         document = place_all(document, self.placements)
-        for patch in document.patches.values():
-            self._check_hangs(document, patch)
+        check_links(document)
         return document
-
-    def _check_hangs(self, document: ContactDocument, patch: Patch) -> None:
-        """No link points past an axis that became shorter."""
-        if not isinstance(patch.placement, Link):
-            return
-        parent_points = document.shape_of(patch.placement.parent).axis.point_count
-        own_points = document.shapes[patch.shape].axis.point_count
-        if patch.placement.parent_point >= parent_points or patch.placement.own_point >= own_points:
-            raise CommandRejected(f"the new axis is too short for the link of {patch.name!r}; link it anew.")
 
 
 @register_command

@@ -12,7 +12,7 @@ from contact_core.contact.shape import PatchShape
 from contact_core.document.document import ContactDocument, Surface, named
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.command import BaseCommand, Command, register_command
-from contact_core.edit.commands.checks import NamedPlacements, check_free, place_all
+from contact_core.edit.commands.checks import NamedPlacements, check_free, check_links, place_all
 from contact_core.errors import CommandRejected
 from contact_core.pose.rig import Pose
 
@@ -135,6 +135,7 @@ class RebindSurface(BaseCommand):
             face = getattr(patch.placement, "face", 0)
             if patch.surface == self.surface.name and face >= self.surface.faces:
                 raise CommandRejected(f"the root of {patch.name!r} is not on the new {self.surface.name!r}.")
+        check_links(document)
         return document
 
 

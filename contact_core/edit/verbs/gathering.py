@@ -11,10 +11,11 @@ import numpy as np
 from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Root
 from contact_core.contact.proximity import patches_of_vertices, touching_vertices
+from contact_core.document.document import named
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import Group, Transfer
 from contact_core.edit.verbs.painting import PaintingVerbs
-from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
@@ -116,11 +117,9 @@ class GatheringVerbs(PaintingVerbs):
         names by the names copied.
         """
         document = self.document
-        if group not in document.groups:
-            raise CommandRejected(
-                f"there is no group {group!r}; there are: {', '.join(document.groups) or 'none'}."
-            )
-        members = document.groups[group]
+        members = named(document.groups, group, "group")
+        if not onto:
+            raise InvalidInput("a group is transferred onto at least one surface.")
         first = self._frame(document.patch(members[0]).surface, self.root(members[0]))
         goal = self._frame(onto[0], self.root_at(onto[0], point, heading, direction))
         turned = replace(goal, normal=-goal.normal) if mirrored else goal
@@ -164,6 +163,5 @@ class GatheringVerbs(PaintingVerbs):
             if best is None or distance < best[0]:
                 heading = direction_to_heading(mesh, found.points, (back[:3, :3] @ direction)[None])
                 best = distance, surface, Root.at(found.points, complex(heading[0]))
-        if best is None:
-            raise InvalidInput("a group is transferred onto at least one surface.")
+        assert best is not None
         return best[1], best[2]

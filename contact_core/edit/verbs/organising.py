@@ -12,7 +12,7 @@ from contact_core.arrays import FloatArray
 from contact_core.contact.area import PatchArea, measure_area
 from contact_core.contact.distortion import Distortion, measure_distortion
 from contact_core.contact.pairing import correspond
-from contact_core.document.document import Color, ContactPair
+from contact_core.document.document import Color, ContactPair, named
 from contact_core.edit.commands import (
     ClearPose,
     Group,
@@ -71,7 +71,7 @@ class OrganisingVerbs(Editor):
 
     def pair_geometry(self, name: str) -> PairGeometry:
         """One pair with its points: as many on either side, those that ran off a boundary with weight 0."""
-        pair = self.document.pairs[name]
+        pair = named(self.document.pairs, name, "pair")
         ends = [self.document.patch(end) for end in (pair.manipulator, pair.object)]
         here, there = (self.reconstruction(end.name) for end in ends)
         shape = self.document.shapes[ends[0].shape]

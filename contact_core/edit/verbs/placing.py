@@ -43,8 +43,7 @@ class PlacingVerbs(Editor):
             root = self.root(patch)
             return self.submit(Rotate(patch, self.placement_at(patch, root.heading_to(root.heading * turn))))
         axis = self.axis(patch)
-        if not 0 < about < len(axis):
-            raise CommandRejected(f"the axis of {patch!r} has the points 0..{len(axis) - 1}, but {about} came.")
+        self.check_axis_point(patch, about)
         root, cut = root_from_point(
             self.mesh_of(patch),
             self.document.effective_axis(patch),
@@ -68,7 +67,8 @@ class PlacingVerbs(Editor):
     def scale(self, patch: str, *, along: float | None = None, spread: float | None = None) -> int:
         """Set the factors along the axis and across it (1: as painted); None leaves a factor as it is."""
         axis = self.document.effective_axis(patch)
-        return self.submit(Scale(patch, along or axis.along, spread or axis.spread))
+        along, spread = axis.along if along is None else along, axis.spread if spread is None else spread
+        return self.submit(Scale(patch, along, spread))
 
     def mirror(self, patch: str, mirrored: bool | None = None) -> int:
         """Turn a patch into its mirror image about its first direction, or back."""
@@ -150,8 +150,7 @@ class PlacingVerbs(Editor):
         if self.document.patch(child).surface != self.document.patch(parent).surface:
             raise CommandRejected(f"{child!r} and {parent!r} lie on different surfaces; a link is a path on one.")
         axis = self.axis(child)
-        if not 0 <= own_point < len(axis):
-            raise InvalidInput(f"the axis of {child!r} has {len(axis)} points, but point {own_point} came.")
+        self.check_axis_point(child, own_point)
         link = link_to(
             self.mesh_of(child),
             parent,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,8 +60,24 @@ def plan_rebind(editor: Editor, new: Surface, mesh: TriangleMesh) -> tuple[Rebin
         points = points_from_axis(mesh, shape.coordinates, axes[name], own, mirrored=patch.mirrored, unit=unit)
         before = editor.points(name).positions(old_mesh)
         moves[name] = float(np.linalg.norm(points.points.positions(mesh) - before, axis=1).max(initial=0.0))
-    placements = tuple((name, _placed(editor, name, mesh, axes)) for name in on_it)
-    return RebindSurface(new, FrozenMap(shapes), placements), RebindReport(moves)
+    placements = [(name, _placed(editor, name, mesh, axes)) for name in on_it]
+    placements += _links_elsewhere(editor, new.name, shapes)
+    return RebindSurface(new, FrozenMap(shapes), tuple(placements)), RebindReport(moves)
+
+
+def _links_elsewhere(
+    editor: Editor, surface: str, shapes: Mapping[str, PatchShape]
+) -> Iterator[tuple[str, Placement]]:
+    """Links on other surfaces between patches whose axes get other points: from first point to first point, where
+    both stay."""
+    for name, patch in editor.document.patches.items():
+        link = patch.placement
+        if not isinstance(link, Link) or patch.surface == surface:
+            continue
+        if {patch.shape, editor.document.patch(link.parent).shape} & set(shapes):
+            root, above = editor.root(name), editor.root(link.parent)
+            first = Axis(above.point(), np.array([above.heading]), np.zeros(1))
+            yield name, link_to(editor.mesh_of(name), link.parent, first, root.point(), root.heading)
 
 
 def _projected_shape(

@@ -68,7 +68,8 @@ class SetVerbs(Editor):
         entry in `roots`, and what hangs on it follows by its links. Raises InvalidInput naming what is missing.
         """
         loaded = source if isinstance(source, ContactSet) else load_contact_set(source)
-        names, keys = self._fresh_names(loaded)
+        names = self._fresh(loaded.patches, self.document.patches)
+        keys = self._fresh(loaded.shapes, self.document.shapes)
         patches, missing = [], []
         for patch in loaded.parents_first():
             old = loaded.surfaces[patch.surface]
@@ -87,28 +88,21 @@ class SetVerbs(Editor):
             raise InvalidInput(
                 f"the set {loaded.title!r} was painted on another mesh: give roots for {', '.join(missing)}."
             )
-        taken = set(self.document.pairs)
-        pairs = []
-        for pair in loaded.pairs.values():
-            name = self.document.free_name(pair.name, dict.fromkeys(taken))
-            taken.add(name)
-            pairs.append(replace(pair, name=name, manipulator=names[pair.manipulator], object=names[pair.object]))
-        groups = {
-            self.document.free_name(name, self.document.groups): tuple(names[member] for member in members)
-            for name, members in loaded.groups.items()
-        }
+        pair_names = self._fresh(loaded.pairs, self.document.pairs)
+        pairs = [
+            replace(pair, name=pair_names[name], manipulator=names[pair.manipulator], object=names[pair.object])
+            for name, pair in loaded.pairs.items()
+        ]
+        group_names = self._fresh(loaded.groups, self.document.groups)
+        groups = {group_names[name]: tuple(names[m] for m in members) for name, members in loaded.groups.items()}
         shapes = {keys[key]: shape for key, shape in loaded.shapes.items()}
         self.submit(Import(tuple(patches), FrozenMap(shapes), tuple(pairs), FrozenMap(groups), loaded.title))
         return names
 
-    def _fresh_names(self, loaded: ContactSet) -> tuple[dict[str, str], dict[str, str]]:
-        """Names for patches and keys for shapes that the document does not use yet."""
-        taken, names = dict.fromkeys(self.document.patches), {}
-        for name in loaded.patches:
+    def _fresh(self, wanted: Iterable[str], among: Mapping[str, object]) -> dict[str, str]:
+        """By each wanted name the one that it gets, which nothing of the document has, nor any other of them."""
+        taken, names = dict.fromkeys(among), {}
+        for name in wanted:
             names[name] = self.document.free_name(name, taken)
             taken[names[name]] = None
-        taken, keys = dict.fromkeys(self.document.shapes), {}
-        for key in loaded.shapes:
-            keys[key] = self.document.free_name(key, taken)
-            taken[keys[key]] = None
-        return names, keys
+        return names
