@@ -1,6 +1,6 @@
 """Default axes against axes drawn by hand: agreement and transfer distortion, for every built-in hand.
 
-    python benchmarks/bench_axes.py [--picture docs/images/axis_generators.png | --held-out rigs/NAME.glb]
+    python benchmarks/bench_axes.py [--picture docs/images/axis_generators.png | --held-out RIG.glb] [--page]
 
 For each patch of reference_axes.toml, painted by the disk brush, and for each generator: the angle between its
 axis and the reference (0 to 180 degrees: a wrong sign counts), how far the middles lie apart (in brush radii),
@@ -33,6 +33,11 @@ from contact_core.session import Session
 
 HERE = Path(__file__).parent
 KINDS = ("tip", "pad", "palm", "band", "side", "crease", "heel", "edge")
+COLUMNS = {"tip": ("tip",), "pad": ("pad",), "palm": ("palm",), "band across": ("band",)}
+COLUMNS_HELD_OUT = {
+    "tip": ("tip",), "pad": ("pad",), "along": ("palm", "side", "edge"), "across": ("band", "crease", "heel"),
+}  # fmt: skip
+PAGE = HERE.parent / "docs" / "algorithms" / "axes.md"
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +130,40 @@ def picture(asset: Asset, patches: list[Painted], drawn: dict[str, SurfacePoints
     )
 
 
+def table(found: dict[tuple[str, str], list[dict[str, float]]], columns: dict[str, tuple[str, ...]]) -> str:
+    """The page's table: angle in degrees, median, and the share within 20 degrees, by generator and kind."""
+    names = list(dict.fromkeys(name for name, _ in found))
+    rows = []
+    for name in names:
+        angles = [
+            np.array([row["angle"] for kind in kinds for row in found[name, kind]]) for kinds in columns.values()
+        ]
+        heads = [f"{title} ({len(angle)})" for title, angle in zip(columns, angles, strict=True)]
+        if "across" in columns:  # how much of it is the sign
+            angles.append(np.minimum(angles[-1], 180.0 - angles[-1]))
+            heads.append("across, sign aside")
+        rows.append([name, *(f"{np.median(angle):.0f} / {np.mean(angle <= 20.0):.0%}" for angle in angles)])
+    lines = [["generator", *heads], ["---"] * (1 + len(heads)), *rows]
+    return (
+        "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        .replace("| --- ", "|---")
+        .replace("--- |", "---|")
+    )
+
+
+def put_into_page(text: str, name: str) -> None:
+    """Put a table between the page's marks of that name."""
+    before, mark, rest = PAGE.read_text(encoding="utf-8").partition(f"<!-- {name}: written by bench_axes.py -->\n")
+    _, end, after = rest.partition("<!-- end -->")
+    assert mark and end, f"{PAGE} has no marks for {name}"
+    PAGE.write_text(f"{before}{mark}\n{text}\n\n{end}{after}", encoding="utf-8")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--picture", type=Path, help="where to write the hands side by side")
     parser.add_argument("--held-out", type=Path, help="a glTF hand of held_out_axes.toml, in place of the samples")
+    parser.add_argument("--page", action="store_true", help="put the angles into docs/algorithms/axes.md")
     arguments = parser.parse_args()
     plugins = PluginManager()
     ball = plugins.get(SAMPLES, "baseball").build().mesh
@@ -160,6 +195,10 @@ def main() -> None:
                 f" {np.mean(angle <= 20.0):10.0%} {np.median(offset):11.2f} {np.median(median):8.3f}"
                 f" {worst.max():8.3f} {int(folds.sum()):6d}"
             )
+    if arguments.page:
+        put_into_page(
+            table(found, COLUMNS_HELD_OUT if held_out else COLUMNS), "held out" if held_out else "tuned on"
+        )
     if arguments.picture:
         renderer = plugins.get(RENDERERS, "software")  # the same picture on every machine
         renderer.render(pictures, arguments.picture, size=(360 * len(pictures), 560))

@@ -51,6 +51,29 @@ def moved(request: AxisRequest, rotation: FloatArray, scale: float, shift: Float
     )
 
 
+def crossed(request: AxisRequest) -> AxisRequest:
+    """The same patch with its bone turned a quarter about z, so that a long patch lies across it."""
+    assert request.bones is not None
+    middle = request.bones.mean(axis=1, keepdims=True)
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    return replace(request, bones=middle + (request.bones - middle) @ quarter.T)
+
+
+def mirrored(request: AxisRequest) -> AxisRequest:
+    """The same patch seen in a mirror at x = 0: a left hand for a right one, with triangles outward again."""
+    flip = np.array([-1.0, 1.0, 1.0])
+    points = request.points
+    return replace(
+        request,
+        mesh=TriangleMesh(request.mesh.points * flip, request.mesh.faces[:, ::-1]),
+        points=SurfacePoints(points.faces, points.barycentric[:, ::-1]),
+        bones=None if request.bones is None else request.bones * flip,
+        other_axes={
+            name: SurfacePoints(axis.faces, axis.barycentric[:, ::-1]) for name, axis in request.other_axes.items()
+        },
+    )
+
+
 def turn(seed: int) -> FloatArray:
     """(3, 3) a random rotation."""
     q, r = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))
@@ -172,6 +195,22 @@ class AxisGeneratorContract(Contract):
     def test_a13_works_without_a_rig(self, generator: AxisGenerator) -> None:
         """Gives an axis where there are no bones."""
         assert len(generator.generate(replace(patch("disk"), bones=None, bone_of_point=None))) >= 2
+
+    @needs("mirroring")
+    @pytest.mark.parametrize("bone", ["along", "across"])
+    @pytest.mark.parametrize("name", PATCHES)
+    def test_a14_is_mirrored_with_the_mesh(self, generator: AxisGenerator, name: str, bone: str) -> None:
+        """The mirror image of mesh, patch and bones gets the mirror image of the axis: left hands as right ones."""
+        request = patch(name) if bone == "along" else crossed(patch(name))
+        other = mirrored(request)
+        axis, image = generator.generate(request), generator.generate(other)
+        assert len(axis) == len(image), (len(axis), len(image))
+        there = image.positions(other.mesh) * [-1.0, 1.0, 1.0]
+        apart = np.linalg.norm(axis.positions(request.mesh) - there, axis=1)
+        tolerance = 1e-6 * request.mesh.bounding_box_diagonal
+        assert apart.max() <= tolerance, (
+            f"the axes lie {apart.max():.3g} apart (at most {tolerance:.1e} is allowed)"
+        )
 
 
 def _same(first: AxisRequest, axis: SurfacePoints, second: AxisRequest, other: SurfacePoints) -> None:

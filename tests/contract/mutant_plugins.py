@@ -92,6 +92,20 @@ class Careless(Principal):
         return super().generate(request)
 
 
+class ToTheLeft(Principal):
+    """Runs to the left of its bone, seen from outside, as guided once did: on left hands towards the thumb."""
+
+    def generate(self, request: AxisRequest) -> SurfacePoints:
+        axis = super().generate(request)
+        if request.bones is None:
+            return axis
+        left = np.cross(
+            request.points.normals(request.mesh).mean(axis=0), request.bones[0, 1] - request.bones[0, 0]
+        )
+        at = axis.positions(request.mesh)
+        return axis if (at[-1] - at[0]) @ left >= 0.0 else axis[::-1]
+
+
 class GeneratorMutant(Mutant, AxisGeneratorContract):
     made: type[Principal]
 
@@ -102,7 +116,7 @@ class GeneratorMutant(Mutant, AxisGeneratorContract):
 
 class TestOffTheMesh(GeneratorMutant):
     made, breaks = OffTheMesh, "A02"
-    consequences = ("A03", "A05", "A06", "A07", "A08", "A09", "A10")  # nothing can be measured off the mesh
+    consequences = ("A03", "A05", "A06", "A07", "A08", "A09", "A10", "A14")  # nothing can be measured off the mesh
 
 
 class TestOnePoint(GeneratorMutant):
@@ -112,7 +126,7 @@ class TestOnePoint(GeneratorMutant):
 
 class TestFickle(GeneratorMutant):
     made, breaks = Fickle, "A04"
-    consequences = ("A05", "A06", "A07")  # they compare two runs
+    consequences = ("A05", "A06", "A07", "A14")  # they compare two runs
 
 
 class TestFirstAndLast(GeneratorMutant):
@@ -121,6 +135,7 @@ class TestFirstAndLast(GeneratorMutant):
 
 class TestTowardsX(GeneratorMutant):
     made, breaks = TowardsX, "A06"
+    consequences = ("A14",)  # a mirror turns x round, too
 
 
 class TestInMetres(GeneratorMutant):
@@ -133,6 +148,10 @@ class TestBackAndForth(GeneratorMutant):
 
 class TestCareless(GeneratorMutant):
     made, breaks = Careless, "A12"
+
+
+class TestToTheLeft(GeneratorMutant):
+    made, breaks = ToTheLeft, "A14"
 
 
 # -- brushes -------------------------------------------------------------------------------------------------------

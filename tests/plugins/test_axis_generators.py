@@ -13,11 +13,18 @@ from contact_builtins.axes.farthest_pair import FarthestPair
 from contact_builtins.axes.guided import Guided
 from contact_builtins.axes.medial_axis import MedialAxis
 from contact_builtins.axes.principal import Principal
+from contact_builtins.axes.thumb import towards_thumb
+from contact_builtins.brushes.disk import DiskBrush
 from contact_core.contact.axis_generator import AxisGenerator, AxisRequest
+from contact_core.contact.brush import BrushGesture
 from contact_core.errors import InvalidInput
 from contact_core.geometry import SurfacePoints
+from contact_core.geometry.raycast import Locator
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import SAMPLES
+from contact_core.pose.bones import bones_of
 from contact_core.testing import meshes
-from contact_core.testing.axis_generator_contract import AxisGeneratorContract, patch, scattered
+from contact_core.testing.axis_generator_contract import AxisGeneratorContract, mirrored, patch, scattered
 
 
 class TestFarthestPair(AxisGeneratorContract):
@@ -158,11 +165,80 @@ def test_consistent_keeps_the_angle_to_the_bone() -> None:
     assert direction(request, axis)[:2] == pytest.approx([-np.sqrt(0.5), np.sqrt(0.5)], abs=1e-6)
 
 
-@pytest.mark.parametrize(("angle", "wanted"), [(0.2, 0.2), (3.3, 3.3 - np.pi), (1.4, 1.4), (-1.4, np.pi - 1.4)])
+@pytest.mark.parametrize(("angle", "wanted"), [(0.2, 0.2), (3.3, 3.3 - np.pi), (0.6, 0.6), (-0.6 + np.pi, -0.6)])
 def test_guided_follows_a_stroke_and_never_runs_against_the_bone(angle: float, wanted: float) -> None:
     request = strip(angle)  # the bone lies along x
     found = direction(request, Guided().generate(request))
     assert found[:2] @ [np.cos(wanted), np.sin(wanted)] > np.cos(np.radians(3.0))
+
+
+def fan(lengths: list[float]) -> np.ndarray:
+    """Bones (b, 2, 3) of digits that fan out from the middle of the square's lower edge, from left to right, two to
+    a digit."""
+    bones = []
+    for length, angle in zip(lengths, np.linspace(2.2, 0.9, len(lengths)), strict=True):
+        way = length * np.array([np.cos(angle), np.sin(angle), 0.0])
+        joints = np.array([0.5, 0.1, -0.1]) + np.array([[0.0], [0.5], [1.0]]) * way
+        bones += [joints[:2], joints[1:]]
+    return np.array(bones)
+
+
+@pytest.mark.parametrize("owner", [0, 3, 8])
+@pytest.mark.parametrize(
+    ("lengths", "wanted"), [([0.4, 0.8, 0.9, 0.8, 0.7], 1.0), ([0.7, 0.8, 0.9, 0.8, 0.4], -1.0)]
+)
+def test_guided_runs_away_from_the_thumb(lengths: list[float], wanted: float, owner: int) -> None:
+    """Whichever side the thumb is on, and whichever digit the stroke lies across."""
+    request = replace(strip(0.0), bones=fan(lengths), bone_of_point=np.full(160, owner))
+    assert direction(request, Guided().generate(request))[0] * wanted > 0.99
+
+
+def test_guided_goes_with_the_axes_drawn_already_where_no_digit_is_a_thumb() -> None:
+    request = replace(strip(1.4), bones=np.array([[[0.0, 0.5, -0.3], [1.0, 0.5, -0.3]]]))
+    for sign in (1, -1):
+        drawn = on_plane(np.array([[0.7, 0.3], [0.72, 0.6]]))[::sign]
+        found = Guided().generate(replace(request, other_axes={"drawn": drawn}))
+        assert direction(request, found)[1] * sign > 0.9
+
+
+def test_a_body_has_no_thumb() -> None:
+    """Two arms that reach equally far are no thumb, and neither is a chain without branches."""
+    even = replace(strip(0.0), bones=fan([0.8, 0.9, 0.9, 0.8]), bone_of_point=np.zeros(160, np.int64))
+    assert towards_thumb(even) is None
+    assert towards_thumb(strip(0.0)) is None
+    assert towards_thumb(replace(strip(0.0), bones=None, bone_of_point=None)) is None
+
+
+@pytest.mark.parametrize(
+    "generator", [Guided(), AlongBone(), Consistent(), Principal(), FarthestPair(), MedialAxis()]
+)
+def test_the_mirror_image_of_a_hand_gets_the_mirror_image_of_its_axes(generator: AxisGenerator) -> None:
+    """A right hand and the left one that the mirror shows, painted one patch after the other."""
+    hand = PluginManager(environ={}).get(SAMPLES, "human_hand").build()
+    assert hand.rig is not None
+    drawn: dict[str, SurfacePoints] = {}
+    images: dict[str, SurfacePoints] = {}
+    for name, stroke, radius in STROKES:
+        path = Locator.of(hand.mesh).closest(stroke).points
+        points = DiskBrush().mark(BrushGesture(hand.mesh, path, radius=radius, spacing=radius / 4.0)).points
+        bones, owner = bones_of(hand.rig, points)
+        request = AxisRequest(hand.mesh, points, bones, owner, dict(drawn))
+        other = mirrored(request)
+        drawn[name], image = generator.generate(request), generator.generate(other)
+        there = image.positions(other.mesh) * [-1.0, 1.0, 1.0]
+        assert drawn[name].positions(hand.mesh) == pytest.approx(there, abs=1e-6), name
+        images[name] = image
+    if isinstance(
+        generator, Guided
+    ):  # and on both, the band runs away from the thumb, which is at x > 0 on this one
+        assert direction(request, drawn["band"])[0] < -0.9 and direction(other, images["band"])[0] > 0.9
+
+
+STROKES = (  # on the palm's side of the human hand, metres; radius of the brush
+    ("band", [[0.026, 0.075, 0.008], [0.003, 0.076, 0.007], [-0.015, 0.071, 0.008], [-0.034, 0.063, 0.010]], 0.007),
+    ("index_tip", [[0.0328, 0.1522, 0.0230]], 0.007),
+    ("thumb_pad", [[0.044, 0.055, 0.033], [0.051, 0.069, 0.036]], 0.007),
+)
 
 
 def test_guided_takes_the_bone_for_a_round_patch() -> None:

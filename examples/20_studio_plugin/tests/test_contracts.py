@@ -12,7 +12,7 @@ from contact_core.testing.solver_contract import SolverContract
 
 
 class TestCrosswise(AxisGeneratorContract):
-    cannot = {"without_rig": "it runs across a bone"}
+    cannot = {"without_rig": "it runs across a bone", "mirroring": "from right to left is what it is for"}
 
     @pytest.fixture
     def generator(self) -> Crosswise:

@@ -27,11 +27,17 @@ class AlongBone:
         return through_centre(flat, heading)
 
 
-def bone_heading(request: AxisRequest, flat: Flattened) -> complex | None:
-    """The direction of the patch's bone at its centre, a unit heading; None without a bone, or with one upright."""
+def owning_bone(request: AxisRequest) -> int | None:
+    """The bone that owns most of the patch's points; None without a rig."""
     owners = np.zeros(0, np.int64) if request.bone_of_point is None else request.bone_of_point
     owners = owners[owners >= 0]
-    if request.bones is None or not len(owners):
+    return None if request.bones is None or not len(owners) else int(np.bincount(owners).argmax())
+
+
+def bone_heading(request: AxisRequest, flat: Flattened) -> complex | None:
+    """The direction of the patch's bone at its centre, a unit heading; None without a bone, or with one upright."""
+    bone = owning_bone(request)
+    if bone is None or request.bones is None:
         return None
-    head, tail = request.bones[int(np.bincount(owners).argmax())]  # (3,), (3,)
+    head, tail = request.bones[bone]  # (3,), (3,)
     return projected_heading(flat, tail - head)

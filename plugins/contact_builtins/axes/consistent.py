@@ -25,15 +25,18 @@ class Consistent:
     def generate(self, request: AxisRequest) -> SurfacePoints:
         flat = flatten(request)
         along = bone_heading(request, flat)
-        drawn = _nearest(request, flat)
-        heading: complex | None
-        if drawn is None:
-            heading = along
-        elif along is None:
-            heading = projected_heading(flat, drawn[1] - drawn[0])
-        else:
-            heading = along * _angle_to_bone(request, drawn)
+        heading = drawn_heading(request, flat, along) or along
         return through_centre(flat, principal_heading(flat) if heading is None else heading)
+
+
+def drawn_heading(request: AxisRequest, flat: Flattened, along: complex | None) -> complex | None:
+    """The way of the nearest axis drawn already, None when none is drawn. along: the bone's heading."""
+    drawn = _nearest(request, flat)
+    if drawn is None:
+        return None
+    if along is None:
+        return projected_heading(flat, drawn[1] - drawn[0])
+    return along * _angle_to_bone(request, drawn)
 
 
 def _nearest(request: AxisRequest, flat: Flattened) -> FloatArray | None:

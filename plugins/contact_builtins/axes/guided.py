@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from contact_builtins.axes.along_bone import bone_heading
-from contact_builtins.axes.consistent import Consistent
-from contact_builtins.axes.straight import elongation, flatten, principal_heading, through_centre
+from contact_builtins.axes.consistent import Consistent, drawn_heading
+from contact_builtins.axes.straight import (
+    Flattened,
+    elongation,
+    flatten,
+    principal_heading,
+    projected_heading,
+    through_centre,
+)
+from contact_builtins.axes.thumb import towards_thumb
 from contact_core.contact.axis_generator import AxisRequest
 from contact_core.geometry import SurfacePoints
 
 _LONG = 1.5  # longer than wide by this factor: the shape of the patch tells more than its bone
+_TELLS = 0.3  # a guide nearly square to the axis tells nothing: the cosine below which it is not asked
 
 
 class Guided:
     """A stroke says by its shape where its axis goes and a dab does not. The bone gives the sign: an axis does
-    not run against it, and one that lies rather across it runs to its left, seen from outside. A round patch
-    without a bone goes the way of the axes that are drawn already."""
+    not run against it, and one that lies rather across it runs away from the thumb. Where no digit is like a thumb,
+    it goes the way of the axes that are drawn already, as a round patch without a bone does. None of these knows a
+    left hand from a right one, so the mirror image of a hand gets the mirror image of its axes."""
 
     name = "guided"
-    summary = "along a long patch, along the bone of a round one, never against the bone"
+    summary = (
+        "along a long patch, along the bone of a round one, never against the bone, across it from the thumb on"
+    )
 
     def generate(self, request: AxisRequest) -> SurfacePoints:
         flat = flatten(request)
@@ -25,8 +39,24 @@ class Guided:
         if elongation(flat) < _LONG:
             return Consistent().generate(request) if along is None else through_centre(flat, along)
         heading = principal_heading(flat)
-        if along is not None:
-            turn = heading * along.conjugate()
-            against = turn.real < 0.0 if abs(turn.real) > abs(turn.imag) else turn.imag < 0.0
-            heading = -heading if against else heading
+        for guide in _guides(request, flat, heading, along):
+            way = (heading * guide.conjugate()).real
+            if abs(way) > _TELLS:
+                return through_centre(flat, heading if way > 0.0 else -heading)
         return through_centre(flat, heading)
+
+
+def _guides(request: AxisRequest, flat: Flattened, heading: complex, along: complex | None) -> Iterator[complex]:
+    """Unit headings that an axis should rather go with than against, the most important one first."""
+    if along is None:
+        return
+    turn = heading * along.conjugate()
+    if abs(turn.real) > abs(turn.imag):
+        yield along
+    thumb = towards_thumb(request)
+    away = None if thumb is None else projected_heading(flat, -thumb)
+    if away is not None:
+        yield away
+    drawn = drawn_heading(request, flat, along)
+    if drawn is not None:
+        yield drawn
