@@ -17,8 +17,6 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 from parity_script import FRAME, Outcome, build_scene, prepared, run
 
 from contact_core.document.asset import Asset

@@ -30,13 +30,17 @@ TOLD_GAPS = 8  # of what composition did not find, so that a broken shot does no
 
 @dataclass(frozen=True)
 class OwnedStage:
-    """A stage whose strongest layer is ours. source: the file that was opened, if any; ours: the file was ours."""
+    """A stage whose strongest layer is ours. source: the file that was opened, if any; ours: the file was ours.
+
+    beside: absolute paths that our file names from its own folder.
+    """
 
     stage: Usd.Stage
     layer: Sdf.Layer
     source: Path | None
     ours: bool
     notes: tuple[str, ...] = ()
+    beside: frozenset[str] = frozenset()
 
 
 def new_stage(space: SceneSpace) -> OwnedStage:
@@ -116,7 +120,10 @@ def default_target(owned: OwnedStage) -> Path:
 
 
 def save(owned: OwnedStage, path: Path) -> None:
-    """Write our layer to a file, its sublayers by relative paths. Raises FileRefused, never half a file."""
+    """Write our layer to a file, its sublayers by relative paths. Raises FileRefused, never half a file.
+
+    Files that somebody named in our layer from its old folder are named from the new one.
+    """
     path = path.absolute()
     if path.suffix.lower() not in WRITABLE:
         raise FileRefused(f"cannot write {path.name}: our layer is saved as one of {', '.join(WRITABLE)}.")
@@ -127,6 +134,7 @@ def save(owned: OwnedStage, path: Path) -> None:
         )
     copy = Sdf.Layer.CreateAnonymous()
     copy.TransferContent(owned.layer)
+    UsdUtils.ModifyAssetPaths(copy, lambda asset: _relative(asset, path.parent) if asset in owned.beside else asset)
     copy.subLayerPaths = [_relative(item, path.parent) for item in copy.subLayerPaths]
     with refusing(path), replacing(path) as temporary:
         if not copy.Export(str(temporary)):
@@ -162,10 +170,20 @@ def _open_ours(path: Path) -> OwnedStage:
         raise FileRefused(
             f"{path} has contact layout {version}, this release reads {LAYOUT}: install a newer contact-core."
         )
+    beside: set[str] = set()
+
+    def absolute(asset: str) -> str:  # an anonymous layer has no folder that files could be named from
+        where = _absolute(asset, path.parent)
+        if where == asset or not (asset.startswith(("./", "../")) or Path(where).is_file()):
+            return asset  # a search path, an address
+        beside.add(where)
+        return where
+
+    UsdUtils.ModifyAssetPaths(layer, absolute)
     layer.subLayerPaths = [_absolute(item, path.parent) for item in layer.subLayerPaths]
     below = Path(layer.subLayerPaths[0]) if layer.subLayerPaths else path
     stage = _composed(layer, below)
-    return OwnedStage(stage, layer, path, ours=True, notes=_gaps(stage))
+    return OwnedStage(stage, layer, path, ours=True, notes=_gaps(stage), beside=frozenset(beside))
 
 
 def _composed(layer: Sdf.Layer, source: Path) -> Usd.Stage:
@@ -210,9 +228,10 @@ def _relative(asset: str, folder: Path) -> str:
     if Sdf.Layer.IsAnonymousLayerIdentifier(asset) or not Path(asset).is_absolute():
         return asset
     try:
-        return Path(os.path.relpath(asset, folder)).as_posix()
+        relative = Path(os.path.relpath(asset, folder)).as_posix()
     except ValueError:  # another drive
         return asset
+    return relative if relative.startswith("../") else f"./{relative}"
 
 
 def _absolute(asset: str, folder: Path) -> str:

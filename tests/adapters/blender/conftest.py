@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,14 @@ if IN_BLENDER:
         import bpy
 
         return bpy
+
+    @pytest.fixture(autouse=True)
+    def _nobody_listens_any_more() -> Iterator[None]:
+        """Sessions that a test did not close follow no undo of the next."""
+        yield
+        if "bpy" in sys.modules:
+            for handlers in (sys.modules["bpy"].app.handlers.undo_post, sys.modules["bpy"].app.handlers.redo_post):
+                handlers.clear()
 
     @pytest.fixture
     def scenes() -> Any:

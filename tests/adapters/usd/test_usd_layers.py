@@ -16,7 +16,7 @@ import pytest
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 
-from pxr import Gf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom
 
 from contact_core.document.asset import Asset
 from contact_core.document.schema import VERSION, parse_document, same_documents
@@ -161,6 +161,34 @@ def test_sources_are_never_written(tmp_path: Path) -> None:
     for name in ("source.usda", "source.contact.usda"):  # relative paths: the pair of files can move
         (tmp_path / name).rename(tmp_path / "elsewhere" / name)
     assert [item.id for item in UsdHost(tmp_path / "elsewhere" / "source.contact.usda").objects()] == [key]
+
+
+def test_files_that_others_named_in_our_layer_are_found_wherever_it_is_saved(tmp_path: Path) -> None:
+    """A reference and a texture, added to our layer by another tool with relative paths."""
+    prop = UsdHost()
+    prop.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
+    prop.layer.customLayerData = {}
+    prop.save(tmp_path / "prop.usda")
+    (tmp_path / "paint.png").write_bytes(b"")
+    UsdHost().save(tmp_path / "ours.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "ours.usda"))
+    stage.DefinePrim("/added").GetReferences().AddReference("./prop.usda", "/torus")
+    for name, asset in (("near", "paint.png"), ("searched", "studio/paint.png"), ("far", "https://studio/p.png")):
+        stage.GetPrimAtPath("/added").CreateAttribute(name, Sdf.ValueTypeNames.Asset).Set(asset)
+    stage.GetRootLayer().Save()
+    del stage
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    host = UsdHost(tmp_path / "ours.usda")
+    for place in ("a/b/deeper.usda", "ours.usda", "a/again.usdc"):
+        host.save(tmp_path / place)
+        stage = Usd.Stage.Open(str(tmp_path / place))
+        added = stage.GetPrimAtPath("/added")
+        assert added.IsA(UsdGeom.Mesh), stage.GetRootLayer().ExportToString()
+        values = {name: added.GetAttribute(name).Get() for name in ("near", "searched", "far")}
+        assert Path(values["near"].resolvedPath).resolve() == (tmp_path / "paint.png").resolve()
+        assert (values["searched"].path, values["far"].path) == ("studio/paint.png", "https://studio/p.png")
+        again = UsdHost(tmp_path / place)
+        assert [item.id for item in again.objects()] == ["/added"] and again.space().notes == ()
 
 
 def test_a_stage_that_a_dcc_has_open_keeps_its_layers(tmp_path: Path) -> None:
