@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from parity_script import FRAME, Outcome, build_scene, prepared, run
 
 from contact_core.document.asset import Asset
