@@ -53,6 +53,8 @@ class Surface:
             )
         if not 0.0 < self.meters_per_unit < np.inf:
             raise InvalidInput(f"meters_per_unit is a positive number, but {self.meters_per_unit} came.")
+        if min(self.points, self.faces) < 0:
+            raise InvalidInput(f"{self.name!r} cannot have {self.points} points and {self.faces} faces.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +210,14 @@ def _checked_color(color: Any) -> Color:
     return r, g, b
 
 
+def is_name(name: object) -> bool:
+    """Whether something can be a name: printable text, trimmed, not empty and of bounded length."""
+    if not isinstance(name, str) or not 0 < len(name) <= MAX_NAME:
+        return False
+    return name.isprintable() and name == name.strip()
+
+
 def check_name(name: str, kind: str) -> None:
     """Raises InvalidInput unless `name` can be a name: printable, trimmed, not empty and of bounded length."""
-    if not (isinstance(name, str) and 0 < len(name) <= MAX_NAME and name.isprintable() and name == name.strip()):
+    if not is_name(name):
         raise InvalidInput(f"the name of {kind} is 1..{MAX_NAME} printable characters, trimmed; got {name!r}.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -11,7 +12,7 @@ from weakref import WeakKeyDictionary
 from contact_core.contact.placement import Link
 from contact_core.contact.shape import PatchShape
 from contact_core.document.codec import Fragment, from_json, pretty, to_json
-from contact_core.document.document import ContactDocument, Patch
+from contact_core.document.document import ContactDocument, Patch, is_name
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.errors import FileRefused
 
@@ -58,11 +59,11 @@ def same_documents(a: ContactDocument, b: ContactDocument) -> bool:
 
 
 def parse_json(text: bytes, source: str) -> Any:
-    """JSON of bounded size, without NaN. Raises FileRefused naming the line."""
+    """JSON of bounded size, without NaN, each key once. Raises FileRefused naming the line."""
     if len(text) > MAX_BYTES:
         raise FileRefused(f"{source} has {len(text)} bytes; more than {MAX_BYTES} are refused.")
     try:
-        return json.loads(text.decode("utf-8"), parse_constant=_refuse_constant)
+        return json.loads(text.decode(), parse_constant=_refuse_constant, object_pairs_hook=_object_of)
     except (ValueError, RecursionError) as error:  # JSONDecodeError and UnicodeDecodeError are ValueErrors
         raise FileRefused(f"{source} is not valid JSON: {error}.") from error
 
@@ -102,6 +103,7 @@ def inconsistencies(document: ContactDocument) -> Iterator[str]:
                 yield f"{kind} {item.name!r} is filed under {key!r}."
     for patch in document.patches.values():
         yield from _patch_inconsistencies(document, patch)
+    yield from _cycles(document)
     used = {patch.shape for patch in document.patches.values()}
     yield from (f"shape {key!r} belongs to no patch." for key in document.shapes if key not in used)
     for pair in document.pairs.values():
@@ -109,11 +111,20 @@ def inconsistencies(document: ContactDocument) -> Iterator[str]:
             if end not in document.patches:
                 yield f"pair {pair.name!r} names the patch {end!r}, which does not exist."
     for name, members in document.groups.items():
+        if not members or len(set(members)) != len(members):
+            yield f"group {name!r} needs patches, each once."
         for member in members:
             if member not in document.patches:
                 yield f"group {name!r} names the patch {member!r}, which does not exist."
-    yield from (f"a pose names the surface {name!r}, which does not exist."
-                for name in document.poses if name not in document.surfaces)  # fmt: skip
+    for name, pose in document.poses.items():
+        if name not in document.surfaces:
+            yield f"a pose names the surface {name!r}, which does not exist."
+        if len(set(pose.joints)) != len(pose.joints):
+            yield f"the pose of {name!r} names a joint twice."
+    for kind, names in (("a group", document.groups), ("a namespace", document.extras)):
+        for name in names:
+            if not is_name(name):
+                yield f"{name!r} is no name for {kind}."
 
 
 def _patch_inconsistencies(document: ContactDocument, patch: Patch) -> Iterator[str]:
@@ -145,14 +156,23 @@ def _link_inconsistencies(
         yield f"patch {patch.name!r} hangs on point {link.parent_point} of {parent.name!r}, past its axis."
     if shape is not None and link.own_point >= shape.axis.point_count:
         yield f"patch {patch.name!r} hangs by its point {link.own_point}, past its axis."
-    seen, above = {patch.name}, parent
-    while isinstance(above.placement, Link) and above.name not in seen:
-        seen.add(above.name)
-        if above.placement.parent not in document.patches:
-            return
-        above = document.patches[above.placement.parent]
-    if above.name in seen:
-        yield f"patch {patch.name!r} hangs on itself through {above.name!r}."
+
+
+def _cycles(document: ContactDocument) -> Iterator[str]:
+    """Patches that hang on themselves; each patch is walked over once, so that a long chain costs its length."""
+    sound: set[str] = set()
+    for name in document.patches:
+        line: dict[str, None] = {}  # in order
+        at = name
+        while at in document.patches and at not in sound and at not in line:
+            line[at] = None
+            placement = document.patches[at].placement
+            if not isinstance(placement, Link):
+                break
+            at = placement.parent
+            if at in line:
+                yield f"patch {at!r} hangs on itself through {next(reversed(line))!r}."
+        sound.update(line)
 
 
 _shape_texts: WeakKeyDictionary[PatchShape, Fragment] = WeakKeyDictionary()
@@ -163,6 +183,15 @@ def _shape_text(shape: PatchShape) -> Fragment:
     if shape not in _shape_texts:
         _shape_texts[shape] = Fragment(pretty(to_json(shape), 2))
     return _shape_texts[shape]
+
+
+def _object_of(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; one that names a key twice says two things at once."""
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+        raise ValueError(f"an object names {twice!r} twice")
+    return found
 
 
 def _refuse_constant(name: str) -> Any:

@@ -12,6 +12,7 @@ from contact_core.contact.mirror import mirrored_root
 from contact_core.contact.placement import Link, Root
 from contact_core.contact.transfer import transported
 from contact_core.document.document import Patch
+from contact_core.edit.command import apply_command
 from contact_core.edit.commands import Bend, LinkPatch, Mirror, Rotate, Scale, Transfer, Translate, Unlink
 from contact_core.edit.verbs.editor import Editor
 from contact_core.errors import CommandRejected, InvalidInput
@@ -65,10 +66,15 @@ class PlacingVerbs(Editor):
         return self.submit(Bend(patch, point, float(axis.turning_angles[point - 1]) + sign * angle))
 
     def scale(self, patch: str, *, along: float | None = None, spread: float | None = None) -> int:
-        """Set the factors along the axis and across it (1: as painted); None leaves a factor as it is."""
+        """Set the factors along the axis and across it (1: as painted); None leaves a factor as it is.
+
+        Raises InvalidInput for a size at which the patch cannot be traced.
+        """
         axis = self.document.effective_axis(patch)
         along, spread = axis.along if along is None else along, axis.spread if spread is None else spread
-        return self.submit(Scale(patch, along, spread))
+        command = Scale(patch, along, spread)
+        self.derived.patch(apply_command(command, self.document), patch)  # kept, so drawing it traces nothing again
+        return self.submit(command)
 
     def mirror(self, patch: str, mirrored: bool | None = None) -> int:
         """Turn a patch into its mirror image about its first direction, or back."""

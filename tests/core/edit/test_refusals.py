@@ -98,6 +98,8 @@ CASES: list[tuple[str, Callable[[Session], object]]] = [
     ("scale", lambda s: s.scale("palm", along=0.0)),
     ("scale", lambda s: s.scale("palm", spread=-1.0)),
     ("scale", lambda s: s.scale("palm", spread=float("inf"))),
+    ("scale", lambda s: s.scale("palm", spread=1e300)),
+    ("scale", lambda s: s.scale("palm", along=1e9)),
     ("mirror", lambda s: s.mirror("nobody")),
     ("transfer", lambda s: s.transfer("palm", "sphere", NOWHERE, heading=1.0)),
     ("transfer", lambda s: s.transfer("palm", "moon", HERE, heading=1.0)),
