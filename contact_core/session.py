@@ -24,6 +24,7 @@ from contact_core.plugins.verbs import PluginVerbs
 from contact_core.proposals.verbs import ProposalVerbs
 
 if TYPE_CHECKING:
+    from contact_core.geometry.engine import GeodesicEngine
     from contact_core.host_link import HostLink
     from contact_core.proposals.proposal import Proposal
 
@@ -37,10 +38,11 @@ class Session(PluginVerbs, ProposalVerbs):
     """Edits one document.
 
     document: to start from, empty by default. plugins: modules or objects with hook implementations, of highest
-    precedence; discover: whether entry points are read. Use `Session.open` for a document file, and `add_surface`
-    for every mesh. Verbs (`paint`, `translate`, `transfer` ...) commit commands; `stroke` gathers a drag into one,
-    `macro` several commands. Use it as a context manager, or call `close`. It is for one thread at a time: while
-    one is in an edit, a stroke or a macro, what another thread commits is refused in words.
+    precedence; discover: whether entry points are read. engine: the geodesic engine, or its name, that measures
+    the coordinates of painted points; the exact one by default. Use `Session.open` for a document file, and
+    `add_surface` for every mesh. Verbs (`paint`, `translate`, `transfer` ...) commit commands; `stroke` gathers a
+    drag into one, `macro` several commands. Use it as a context manager, or call `close`. It is for one thread at a
+    time: while one is in an edit, a stroke or a macro, what another thread commits is refused in words.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class Session(PluginVerbs, ProposalVerbs):
         host: Any = None,
         plugins: Iterable[object] = (),
         discover: bool = True,
+        engine: str | GeodesicEngine | None = None,
     ) -> None:
         self.history = History(document or ContactDocument())
         self.known_meshes = {}
@@ -62,6 +65,8 @@ class Session(PluginVerbs, ProposalVerbs):
         self._stroke: Stroke | None = None
         self._editing = RLock()
         self._equip(plugins, discover=discover)
+        if engine is not None:
+            self._derived.engine = self.named_engine(engine) if isinstance(engine, str) else engine
         self.host = host
         self._host_link: HostLink | None = None
         if host is not None:

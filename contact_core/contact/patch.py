@@ -16,7 +16,7 @@ from contact_core.contact.axis import Axis, reconstruct_axis
 from contact_core.contact.placement import Root
 from contact_core.contact.shape import AxisShape, PatchCoordinates, PatchShape
 from contact_core.errors import InvalidInput
-from contact_core.geometry.exact_geodesics import LogMap, log_map
+from contact_core.geometry.engine import EXACT, ChainedLogMapResult, GeodesicEngine, LogMapResult
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tracing import trace_chains
@@ -53,19 +53,21 @@ def parameterize_patch(
     shape: AxisShape | None = None,
     mirrored: bool = False,
     unit: float = 1.0,
+    engine: GeodesicEngine = EXACT,
 ) -> PatchCoordinates:
     """Coordinates of n points relative to an axis (paper: Algorithm 2, z = r theta / T).
 
     Each point is anchored at its closest axis point, or at anchors (n,) chosen by hand (-1: the closest).
     shape, mirrored, unit: how `axis` was reconstructed; the coordinates are those before scaling and mirroring.
+    engine: who measures; the points come back to where they are as nearly as it is exact.
     Raises InvalidInput naming the first point that no axis point reaches.
     """
     if anchors is None:
-        log = log_map(mesh, axis.points, points)
+        log = engine.log_map(mesh, axis.points, points)
         _check_reached(log.anchor)
         coordinates = _relative(log, axis.tangents[log.anchor], log.anchor)
     else:
-        coordinates = _bound(mesh, axis, points, np.asarray(anchors, dtype=np.int64))
+        coordinates = _bound(mesh, axis, points, np.asarray(anchors, dtype=np.int64), engine)
     return _unshaped(coordinates, shape, mirrored, unit)
 
 
@@ -150,13 +152,18 @@ def _unshaped(
     return PatchCoordinates(coordinates.anchors, legs, coordinates.chain_starts, angles, lengths)
 
 
-def _relative(log: LogMap, tangents: ComplexArray, anchors: IntArray) -> PatchCoordinates:
-    return PatchCoordinates(
-        anchors, log.first_leg / tangents, log.offsets, log.turning_angles, log.lengths
-    )  # fmt: skip
+def _relative(log: LogMapResult, tangents: ComplexArray, anchors: IntArray) -> PatchCoordinates:
+    if isinstance(log, ChainedLogMapResult):
+        return PatchCoordinates(
+            anchors, log.first_leg / tangents, log.offsets, log.turning_angles, log.lengths
+        )  # fmt: skip
+    nowhere, nothing = np.zeros(len(anchors) + 1, np.int64), np.zeros(0)
+    return PatchCoordinates(anchors, log.coordinates / tangents, nowhere, nothing, nothing)
 
 
-def _bound(mesh: TriangleMesh, axis: Axis, points: SurfacePoints, anchors: IntArray) -> PatchCoordinates:
+def _bound(
+    mesh: TriangleMesh, axis: Axis, points: SurfacePoints, anchors: IntArray, engine: GeodesicEngine
+) -> PatchCoordinates:
     """Coordinates with anchors chosen by hand: one log map per anchor that is used."""
     if anchors.shape != (len(points),) or (len(anchors) and not -1 <= anchors.min() <= anchors.max() < len(axis)):
         raise InvalidInput(
@@ -167,7 +174,7 @@ def _bound(mesh: TriangleMesh, axis: Axis, points: SurfacePoints, anchors: IntAr
     for anchor in np.unique(anchors):
         chosen = np.flatnonzero(anchors == anchor)
         sources = axis.points if anchor < 0 else axis.points[anchor]
-        log = log_map(mesh, sources, points[chosen])
+        log = engine.log_map(mesh, sources, points[chosen])
         _check_reached(log.anchor)
         at = log.anchor if anchor < 0 else np.full(len(chosen), anchor)
         part = _relative(log, axis.tangents[at], at)

@@ -17,6 +17,7 @@ from contact_core.contact.patch import PatchPoints, points_from_axis
 from contact_core.contact.placement import Link, Root
 from contact_core.document.document import ContactDocument
 from contact_core.errors import InvalidInput
+from contact_core.geometry.engine import EXACT, GeodesicEngine
 from contact_core.geometry.mesh import TriangleMesh
 
 MOST_POINTS = 1_000_000  # about 60 MB
@@ -26,10 +27,12 @@ T = TypeVar("T")
 class Derived:
     """Roots, axes and points of patches on the meshes of a session.
 
-    computed: how many axes and point sets were traced so far; tests guard the cost by counting.
+    computed: how many axes and point sets were traced so far; tests guard the cost by counting. engine: measures
+    the coordinates of points on their patches; what is reconstructed here is walked by the exact tracer alone.
     """
 
-    def __init__(self, meshes: Mapping[str, TriangleMesh]) -> None:
+    def __init__(self, meshes: Mapping[str, TriangleMesh], engine: GeodesicEngine = EXACT) -> None:
+        self.engine = engine
         self._meshes = meshes  # by content digest: after a rebind, undo finds the old mesh again
         self._kept: OrderedDict[Hashable, tuple[object, int]] = OrderedDict()
         self._points = 0

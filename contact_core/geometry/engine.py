@@ -1,7 +1,8 @@
 """The slot for geodesic engines: what an engine answers, and the exact engine of this package as the default.
 
-A plugin registers another engine through `contact_geodesic_engines`; everything above this floor asks an
-engine and never a kernel, so a studio can put a native one in.
+A plugin registers another engine through `contact_geodesic_engines`, and `Session(engine=NAME)` measures the
+coordinates of painted points with it. What a document holds is walked again by the exact tracer alone, whoever
+measured it: opening a document, undo and replay ask no plugin.
 """
 
 from __future__ import annotations
@@ -40,6 +41,21 @@ class LogMapResult(Protocol):
     def distance(self) -> FloatArray: ...
     @property
     def coordinates(self) -> ComplexArray: ...
+
+
+@runtime_checkable
+class ChainedLogMapResult(LogMapResult, Protocol):
+    """A log map that also knows how its ways bend round saddle vertices, as `LogMap` says. An engine answers this
+    where it can; without chains a way that bends is taken for straight, and misses its target behind the bend."""
+
+    @property
+    def first_leg(self) -> ComplexArray: ...
+    @property
+    def offsets(self) -> IntArray: ...
+    @property
+    def turning_angles(self) -> FloatArray: ...
+    @property
+    def lengths(self) -> FloatArray: ...
 
 
 @dataclass(frozen=True)
@@ -101,3 +117,6 @@ class ExactEngine:
 
     def __repr__(self) -> str:
         return "ExactEngine()"
+
+
+EXACT: GeodesicEngine = ExactEngine()

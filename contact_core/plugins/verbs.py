@@ -12,6 +12,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 
 if TYPE_CHECKING:
     from contact_core.contact.brush import Brush
+    from contact_core.geometry.engine import GeodesicEngine
     from contact_core.plugins.manager import PluginManager
 
 
@@ -58,6 +59,12 @@ class PluginVerbs(Verbs, SurfaceVerbs):
         from contact_core.plugins.registry import BRUSHES
 
         return self.plugins.get(BRUSHES, name)
+
+    def named_engine(self, name: str) -> GeodesicEngine:
+        """A geodesic engine of this session's plugins. Raises InvalidInput that lists what there is."""
+        from contact_core.plugins.registry import GEODESIC_ENGINES
+
+        return self.plugins.get(GEODESIC_ENGINES, name)
 
     def _tell_plugins(self, change: DocumentChanged) -> None:
         """Plugins hear what is committed, from the first commit on, whether or not they were asked for before."""

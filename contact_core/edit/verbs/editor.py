@@ -86,6 +86,7 @@ class Editor(ABC):
             shape=self.document.effective_axis(patch),
             mirrored=self.document.patch(patch).mirrored,
             unit=self.derived.unit(self.document, patch),
+            engine=self.derived.engine,
         )
 
     def check_points(self, surface: str, points: SurfacePoints) -> None:

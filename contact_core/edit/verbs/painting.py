@@ -186,7 +186,7 @@ class PaintingVerbs(Editor):
         self.check_points(surface, picks)
         points, strength = without_doubles(mesh, points, strength)
         axis_shape, axis = draw_axis(mesh, picks, heading, dense=dense)
-        coordinates = parameterize_patch(mesh, axis, points)
+        coordinates = parameterize_patch(mesh, axis, points, engine=self.derived.engine)
         bare = PatchShape(
             axis_shape, coordinates, np.ones(len(points)), self.document.surface(surface).meters_per_unit
         )

@@ -91,7 +91,9 @@ def _projected_shape(
     drawn, axis = draw_axis(mesh, axis_points, heading, dense=False)
     points = _closest(editor.points(name), old_mesh, mesh)
     unit = old.meters_per_unit / new.meters_per_unit
-    coordinates = parameterize_patch(mesh, axis, points, mirrored=patch.mirrored, unit=unit)
+    coordinates = parameterize_patch(
+        mesh, axis, points, mirrored=patch.mirrored, unit=unit, engine=editor.derived.engine
+    )
     turns = -drawn.turning_angles if patch.mirrored else drawn.turning_angles
     own = dict(patch.turns)
     if own and len(turns):  # the deviation stays the patch's own
