@@ -80,7 +80,9 @@ class BlenderHost(
     def space(self) -> SceneSpace:
         scene = bpy.context.scene
         rate = scene.render.fps / scene.render.fps_base
-        return SceneSpace(float(scene.unit_settings.scale_length), "Z", float(rate))
+        silenced = bpy.app.autoexec_fail_message if bpy.app.autoexec_fail else ""
+        note = f"Blender did not run the scripts of this file ({silenced}), so what they drive stands still."
+        return SceneSpace(float(scene.unit_settings.scale_length), "Z", float(rate), (note,) if silenced else ())
 
     # Scene reading and writing
 
@@ -187,6 +189,8 @@ class BlenderHost(
         target = str(bpy.data.filepath) if path is None else str(Path(path).resolve())
         if not target:
             raise FileRefused("this scene came from no file; say where to save it.")
+        if Path(target).suffix.lower() not in self.suffixes:
+            raise FileRefused(f"cannot write {Path(target).name}: a scene of Blender is saved as .blend.")
         try:  # Blender writes a file beside the old one and renames it: whole or not at all
             bpy.ops.wm.save_as_mainfile(filepath=target, check_existing=False)
         except RuntimeError as error:

@@ -288,3 +288,24 @@ def test_reopening_goes_on_where_it_was(torus: Any, tmp_path: Path) -> None:
         again.undo()
     stored = again.host.stored_document()
     assert parse_document(stored.data).patches.keys() == again.document.patches.keys()
+
+
+def test_a_scene_is_saved_as_a_blend_file_only(torus: Any, tmp_path: Path) -> None:
+    """Blender itself would write over a stage or a picture."""
+    stage = tmp_path / "shot.usda"
+    stage.write_text("#usda 1.0")
+    with pytest.raises(FileRefused, match=r"shot\.usda: a scene of Blender is saved as \.blend"):
+        torus.save(stage)
+    assert stage.read_text() == "#usda 1.0"
+
+
+def test_scripts_of_a_file_are_left_to_blenders_setting_and_told(bpy: Any, torus: Any, tmp_path: Path) -> None:
+    """A file from a stranger runs nothing when it is opened; that something stands still is in the notes."""
+    text = bpy.data.texts.new("rig.py")
+    text.write(f"open({str(tmp_path / 'ran')!r}, 'w').close()")
+    text.use_module = True
+    torus.save(tmp_path / "rig.blend")
+    assert torus.space().notes == ()
+    again = type(torus)(tmp_path / "rig.blend")
+    assert not (tmp_path / "ran").exists()
+    assert any("rig.py" in note for note in again.space().notes)
