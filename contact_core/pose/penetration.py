@@ -66,7 +66,7 @@ class PenetrationTerm:
 
 
 class Allowance(NamedTuple):
-    """How deep skin vertices may be: vertices (k,), depths (k,) in world units, below 0 for a distance to keep."""
+    """How deep skin vertices may be: vertices (k,), depths (k,) in l, below 0 for a distance to keep."""
 
     vertices: IntArray
     depths: FloatArray
@@ -74,7 +74,7 @@ class Allowance(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class NoDeeperTerm:
-    """sum max(0, -s_v / l - allowed_v / l)^2 over skin vertices v: a wall rather than a price.
+    """sum max(0, -s_v / l - allowed_v)^2 over skin vertices v: a wall rather than a price.
 
     One vertex an l deeper than it may be costs as much as all contacts one l apart, whatever its area, for it is
     the deepest that matters. allowed: by name of the skinned body. solids, resolution: as for penetration.
@@ -92,12 +92,12 @@ class NoDeeperTerm:
             index = problem.body_index(name)
             track = vertex_track(problem.bodies[index].rig, vertices, int(problem.bone_offsets[index]))
             weights = np.full(len(vertices), self.weight)
-            skins.append(_Skin(name, track, weights, depths))
+            skins.append(_Skin(name, track, weights, problem.unit * depths))
         return _Depths(problem.unit, skins, solids_of(problem, self.solids, self.resolution))
 
 
 class _Skin(NamedTuple):
-    """Vertices of one body: their track, weights (k,), and depths (k,) that cost nothing."""
+    """Vertices of one body: their track, weights (k,), and depths (k,) that cost nothing, world units."""
 
     body: str
     track: Track

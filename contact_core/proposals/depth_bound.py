@@ -55,7 +55,7 @@ class DepthBound:
         allowed = {}
         for name, depths in self.allowed.items():
             watched = np.flatnonzero(np.isfinite(depths))
-            allowed[name] = Allowance(watched, depths[watched])
+            allowed[name] = Allowance(watched, depths[watched] / self.unit)
         return NoDeeperTerm(allowed, solids={name: solid.meshes for name, solid in self.solids.items()})
 
     def holds(self, now: Mapping[str, Sunk]) -> bool:

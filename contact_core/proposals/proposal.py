@@ -122,7 +122,8 @@ def slide(
     _raise_if_cancelled(slid.solution)
     for contact, root in slid.roots.items():
         name = start.pairs[contact].object
-        draft.place(name, root.point(), heading=root.heading)
+        if root != draft.root(name):
+            draft.place(name, root.point(), heading=root.heading)
     _take_poses(draft, slid.solution)
     command = change(start, draft.document, "Slide contacts")
     return Proposal(command, draft.document, revision, slid.fixed, slid.solution, left_out)

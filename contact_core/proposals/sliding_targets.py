@@ -121,9 +121,13 @@ class SlidingTargets:
         return trace.points, carried / np.abs(carried)
 
     def roots(self, theta: FloatArray) -> dict[str, Root]:
-        """Where each patch is at theta, by contact."""
+        """Where each patch is at theta, by contact; bitwise where it was if it did not move."""
         points, headings = self.where(theta)
-        return {p.contact: Root.at(points[i], complex(headings[i])) for i, p in enumerate(self.patches)}
+        moved = np.any(self.shares(theta) != 0.0, axis=1)
+        return {
+            patch.contact: Root.at(points[i], complex(headings[i])) if moved[i] else patch.root
+            for i, patch in enumerate(self.patches)
+        }
 
     def placed(self, theta: FloatArray) -> TracedPatches:
         """The patches at theta, traced; the last ones are kept, for derivatives come after values."""

@@ -88,6 +88,27 @@ def test_gradients_of_slides_are_exact() -> None:
     assert np.abs(numeric[-6:]).max() > 0.0
 
 
+@pytest.mark.parametrize("held", ["nothing", "slides", "one slide"])
+def test_what_bones_and_slides_move_together(held: str) -> None:
+    """The Gauss-Newton matrix of bones and slides, put together by parts, is that of the whole Jacobian, which is
+    that of central differences; also where some or all of the slides are held."""
+    problem, sliding = spread_too_far()
+    together = sliding_problem(problem, sliding)
+    dofs = {"nothing": [], "slides": together.charts[2].dof_names, "one slide": ["right.turn"]}[held]
+    together = replace(together, held={"floor.sliding": dofs})
+    theta = together.start + np.random.default_rng(1).normal(0.0, 0.05, len(together.start))
+    state, gap = together.state(theta), together.pairs.gap
+    jacobian = state.jacobian(gap)  # (k, 3, d)
+    weights = np.linspace(0.5, 2.0, len(gap))
+    whole = np.einsum("kid,k,kie->de", jacobian, weights, jacobian)
+    assert state.quadratic(gap, gap.gram(weights)) == pytest.approx(whole, rel=1e-9, abs=1e-9)
+    forces = np.random.default_rng(2).normal(size=(len(gap), 3))
+    assert state.pull(gap, forces) == pytest.approx(np.einsum("kid,ki->d", jacobian, forces), rel=1e-9, abs=1e-9)
+    for q, step in enumerate(1e-6 * np.eye(len(theta))):
+        ends = [together.state(theta + sign * step).vectors(gap) for sign in (1.0, -1.0)]
+        assert jacobian[:, :, q] == pytest.approx((ends[0] - ends[1]) / 2e-6, abs=1e-6)
+
+
 def test_slack_is_kept_exactly() -> None:
     problem, sliding = spread_too_far(movable=False)
     tight = [replace(patch, slack=0.03, penalty=0.0) for patch in sliding]
