@@ -79,15 +79,20 @@ def open_stage(path: Path) -> OwnedStage:
 def on_stage(stage: Usd.Stage) -> OwnedStage:
     """A stage that a DCC has open: our layer goes under its session layer, stronger than all files.
 
-    Raises InvalidInput for a stage without a session layer.
+    Where another host put one there before, that is ours too: a stage has one document. Raises InvalidInput for a
+    stage without a session layer.
     """
-    if stage.GetSessionLayer() is None:
+    session = stage.GetSessionLayer()
+    if session is None:
         raise InvalidInput(
             "this stage was opened without a session layer, so there is no place above its files for the contact"
             " layer; open it with one, which is what Usd.Stage.Open does by itself."
         )
-    layer = _owned_layer()
-    stage.GetSessionLayer().subLayerPaths.insert(0, layer.identifier)
+    there = (Sdf.Layer.Find(identifier) for identifier in session.subLayerPaths)
+    layer = next((item for item in there if item is not None and OWNED in item.customLayerData), None)
+    if layer is None:
+        layer = _owned_layer()
+        session.subLayerPaths.insert(0, layer.identifier)
     return OwnedStage(stage, layer, None, ours=False)
 
 

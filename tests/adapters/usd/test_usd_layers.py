@@ -206,6 +206,25 @@ def test_a_stage_that_a_dcc_has_open_keeps_its_layers(tmp_path: Path) -> None:
     assert host.undo() and host.stored_document() is None
 
 
+def test_every_host_on_one_stage_has_its_one_document() -> None:
+    """A tool of a DCC makes a host, is closed and opened again: it goes on where it was."""
+    stage = Usd.Stage.CreateInMemory()
+    for revision in (1, 2, 3):
+        host = UsdHost.on(stage)
+        stored = host.stored_document()
+        assert (0 if stored is None else stored.revision) == revision - 1
+        host.store_document(StoredDocument(b"{}", revision, VERSION))
+        assert stage.GetPrimAtPath("/Contacts").GetAttribute("contact:revision").Get() == revision
+        assert host.undo() and host.redo() and not host.redo()
+        del host
+    assert len(stage.GetSessionLayer().subLayerPaths) == 1
+    one, other = UsdHost.on(stage), UsdHost.on(stage)
+    one.store_document(StoredDocument(b"{}", 4, VERSION))
+    other.store_document(StoredDocument(b"{}", 5, VERSION))
+    assert one.stored_document() == other.stored_document() == StoredDocument(b"{}", 5, VERSION)
+    assert other.undo() and one.stored_document().revision == 4  # type: ignore[union-attr]
+
+
 def test_three_hundred_steps_of_core_host_and_strangers_agree() -> None:
     """Core commands, the host's undo and redo, and edits of a script: document, storage and cursor agree."""
     host, session, key = torus_host()
