@@ -59,3 +59,26 @@ class TestUsdHost(HostContract):
 
     def scene_state(self, host: UsdHost) -> str:
         return str(host.layer.ExportToString())
+
+
+class TestUsdHostOnAnOpenStage(HostContract):
+    """What a DCC does: it has the stage open, with the artist's file as root, and our layer goes above."""
+
+    subject = "USD on an open stage"
+    cannot: ClassVar = {
+        **TestUsdHost.cannot,
+        "files": "the DCC saves its own files; our layer alone is saved with a path",
+    }
+
+    @pytest.fixture
+    def build(self, tmp_path: Path) -> Build:
+        counter = itertools.count()
+
+        def opened(scene: HostScene) -> UsdHost:
+            path = scenes().write_scene(scene, tmp_path / f"scene{next(counter)}.usda")
+            return UsdHost.on(Usd.Stage.Open(str(path)))
+
+        return opened
+
+    foreign_edit = TestUsdHost.foreign_edit
+    scene_state = TestUsdHost.scene_state
