@@ -18,6 +18,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
 from contact_core.arrays import FloatArray
+from contact_core.document.document import ContactPair
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.session import Session
@@ -72,13 +73,8 @@ def publish(host: UsdHost, session: Session, prims: Mapping[str, str]) -> None:
         for name, path in paths.items():
             _write_patch(host.stage, path, session, name, Sdf.Path(prims[document.patches[name].surface]))
         for name, key in _identifiers(document.pairs).items():
-            pair = document.pairs[name]
-            prim = UsdGeom.Scope.Define(host.stage, PAIRS.AppendChild(key)).GetPrim()
-            prim.AddAppliedSchema("ContactPairAPI")
-            _text(prim, "contact:name", name)
-            prim.CreateRelationship("contact:manipulator", False).SetTargets([paths[pair.manipulator]])
-            prim.CreateRelationship("contact:object", False).SetTargets([paths[pair.object]])
-            prim.CreateAttribute("contact:weight", _TYPES.Float, False, Sdf.VariabilityUniform).Set(pair.weight)
+            _write_pair(host.stage, PAIRS.AppendChild(key), name, document.pairs[name], paths)
+        _hide_those_below(host.stage, host.layer)
 
 
 def read_patches(stage: Usd.Stage) -> tuple[PatchPrim, ...]:
@@ -117,6 +113,26 @@ def read_pairs(stage: Usd.Stage) -> tuple[PairPrim, ...]:
             weight = float(prim.GetAttribute("contact:weight").Get())
             found.append(PairPrim(prim.GetAttribute("contact:name").Get(), one, other, weight))
     return tuple(found)
+
+
+def _write_pair(
+    stage: Usd.Stage, path: Sdf.Path, name: str, pair: ContactPair, paths: Mapping[str, Sdf.Path]
+) -> None:
+    prim = UsdGeom.Scope.Define(stage, path).GetPrim()
+    prim.AddAppliedSchema("ContactPairAPI")
+    _text(prim, "contact:name", name)
+    prim.CreateRelationship("contact:manipulator", False).SetTargets([paths[pair.manipulator]])
+    prim.CreateRelationship("contact:object", False).SetTargets([paths[pair.object]])
+    prim.CreateAttribute("contact:weight", _TYPES.Float, False, Sdf.VariabilityUniform).Set(pair.weight)
+
+
+def _hide_those_below(stage: Usd.Stage, layer: Sdf.Layer) -> None:
+    """What a layer further below published (of a shot under this one) is shown where we wrote it, else not."""
+    for scope in (PATCHES, PAIRS):
+        for prim in stage.GetPrimAtPath(scope).GetAllChildren():
+            ours = layer.GetPrimAtPath(prim.GetPath()) is not None
+            if prim.IsActive() != ours:
+                prim.SetActive(ours)
 
 
 def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, surface_path: Sdf.Path) -> None:

@@ -57,11 +57,14 @@ def write(
     place = skeleton.GetPrim().GetPath()
     path = place.GetParentPath().AppendChild(f"{place.name}_ContactPose")
     make_editable(stage, place)
-    animation = UsdSkel.Animation.Get(stage, path)
-    if not animation:
+    if stage.GetEditTarget().GetLayer().GetAttributeAtPath(path.AppendProperty("rotations")):
+        animation = UsdSkel.Animation.Get(stage, path)
+    else:  # perhaps it is in a layer below: a posed shot that another shot is made of
+        samples = _samples_of_source(query)
         animation = UsdSkel.Animation.Define(stage, path)
         animation.CreateJointsAttr(query.GetJointOrder())
-        _copy_source(query, animation)
+        for at, matrices in samples:
+            animation.SetTransforms(matrices, at)
     binding = UsdSkel.BindingAPI.Apply(stage.GetPrimAtPath(place))  # again each time: somebody may have unbound it
     binding.CreateAnimationSourceRel().SetTargets([path])
     time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
@@ -77,17 +80,19 @@ def make_editable(stage: Usd.Stage, path: Sdf.Path) -> None:
         prim.SetInstanceable(False)
 
 
-def _copy_source(query: UsdSkel.SkeletonQuery, animation: UsdSkel.Animation) -> None:
-    """All samples of the animation that drove the skeleton so far, for all of its joints."""
+def _samples_of_source(query: UsdSkel.SkeletonQuery) -> list[tuple[Usd.TimeCode, Vt.Matrix4dArray]]:
+    """All samples, for all joints, of the animation that drove the skeleton so far.
+
+    All are read before one is written: samples of two layers do not join, the stronger layer's are all there is.
+    """
     source = query.GetAnimQuery()
     if not source:
-        return
-    for frame in source.GetJointTransformTimeSamples():
-        matrices = query.ComputeJointLocalTransforms(Usd.TimeCode(frame))
-        animation.SetTransforms(matrices, Usd.TimeCode(frame))
+        return []
+    times = [Usd.TimeCode(frame) for frame in source.GetJointTransformTimeSamples()]
     standing = _standing_time(source.GetPrim())
     if standing.IsDefault():
-        animation.SetTransforms(query.ComputeJointLocalTransforms(standing), standing)
+        times.append(standing)
+    return [(time, query.ComputeJointLocalTransforms(time)) for time in times]
 
 
 def _standing_time(prim: Usd.Prim) -> Usd.TimeCode:

@@ -70,6 +70,32 @@ def test_patches_axes_and_pairs_come_back_equal(tmp_path: Path) -> None:
     assert len(contacts.read_patches(host.stage)) == len(found)
 
 
+def test_what_a_layer_below_published_does_not_come_back(tmp_path: Path) -> None:
+    """A shot over a shot with contacts: a patch that is removed is gone, and comes back when it is brought back."""
+    below, session, key = torus_host()
+    contacts.publish(below, session, {"torus": key})
+    names = set(session.document.patches)
+    session.close()
+    below.layer.customLayerData = {}
+    below.save(tmp_path / "below.usda")
+    host = UsdHost(tmp_path / "below.usda")
+    session = Session(host=host, discover=False)
+    session.add_surface("torus", host.read_surface(key).mesh, world_from_surface=host.placement(key))
+    copy = next(name for name in names if name != "grip (links)")
+    session.remove(copy)
+    contacts.publish(host, session, {"torus": key})
+    assert {patch.name for patch in contacts.read_patches(host.stage)} == {"grip (links)"} == names - {copy}
+    assert contacts.read_pairs(host.stage) == ()
+    host.save(tmp_path / "above.usda")
+    assert len(contacts.read_patches(Usd.Stage.Open(str(tmp_path / "above.usda")))) == 1
+    session.undo()  # the publishing
+    session.undo()
+    assert set(session.document.patches) == names
+    contacts.publish(host, session, {"torus": key})
+    assert {patch.name for patch in contacts.read_patches(host.stage)} == names
+    assert len(contacts.read_pairs(host.stage)) == 1
+
+
 def test_usds_own_validators_find_no_error_in_our_layer(tmp_path: Path) -> None:
     pytest.importorskip("pxr.UsdValidation", reason="this pxr has no UsdValidation")
     host, session, key = torus_host()

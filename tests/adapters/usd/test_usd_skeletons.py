@@ -171,6 +171,28 @@ def test_our_keys_join_the_scenes_keys_and_its_files_stay(source: Path, tmp_path
     assert layer is not None and not layer.dirty
 
 
+@pytest.mark.parametrize("frame", [130.0, None], ids=["a key", "no key"])
+def test_keys_join_those_of_our_own_layer_further_below(frame: float | None, source: Path, tmp_path: Path) -> None:
+    """A posed shot under another shot, retimed: the animation has our name there already."""
+    rig = arm_rig()
+    below = UsdHost(source)
+    for at, seed in ((10.0, 1), (20.0, 2)):
+        below.write_pose(ARM, bent(rig, seed), at)
+    below.save(tmp_path / "below.usda")
+    shot = tmp_path / "shot.usda"
+    shot.write_text("#usda 1.0\n(metersPerUnit = 1\nsubLayers = [@./below.usda@ (offset = 100; scale = 2)])\n")
+    host = UsdHost(shot)
+    assert host.pose_keys(ARM) == (120.0, 140.0)
+    host.write_pose(ARM, bent(rig, 3), frame)
+    host.save(tmp_path / "ours.usda")
+    again = UsdHost(tmp_path / "ours.usda")
+    wanted = {120.0: 1, 140.0: 2} | ({frame: 3} if frame is not None else {})
+    assert again.pose_keys(ARM) == tuple(sorted(wanted))
+    assert pose_error(again.read_pose(ARM), bent(rig, 3 if frame is None else 1)) < 1e-5
+    for at, seed in wanted.items():
+        assert pose_error(again.read_pose(ARM, at), bent(rig, seed)) < 1e-5
+
+
 def test_a_rig_in_an_instance_is_read_and_posed_without_its_twin(tmp_path: Path) -> None:
     path = tmp_path / "crowd.usda"
     stage = Usd.Stage.CreateNew(str(path))
