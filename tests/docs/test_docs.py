@@ -6,17 +6,19 @@ import inspect
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
 from contact_core.edit.command import registered_commands, unregister_command
 from contact_core.plugins import hookspecs
-from contact_core.plugins.registry import SLOTS
+from contact_core.plugins.registry import AXIS_GENERATORS, SLOTS, Slot
 from contact_core.testing import SUITES
 from contact_core.testing.contract import Contract, clause_table
 
@@ -27,8 +29,18 @@ HOOKS = [name for name in vars(hookspecs) if name.startswith("contact_")]
 TITLES = {"pose_solvers": "pose-solvers", "cli": "sub-commands"}
 
 
+FILE = re.compile(r'^```python title="(\w+\.py)"\n(.*?)^```', re.MULTILINE | re.DOTALL)
+
+
 def blocks(page: Path, language: str) -> list[str]:
-    return [code for found, code in BLOCK.findall(page.read_text(encoding="utf-8")) if found == language]
+    """Code that a reader types; what has the name of a file as its title is a file, and no part of these."""
+    text = FILE.sub("", page.read_text(encoding="utf-8"))
+    return [code for found, code in BLOCK.findall(text) if found == language]
+
+
+def files(page: Path) -> dict[str, str]:
+    """Files of a page, by name."""
+    return dict(FILE.findall(page.read_text(encoding="utf-8")))
 
 
 WITH_CODE = [page for page in PAGES if blocks(page, "python")]
@@ -56,35 +68,74 @@ def test_every_hook_is_documented_with_its_signature() -> None:
         assert (function.__doc__ or "").strip() in text, name
 
 
-def test_every_slot_has_a_page_with_a_complete_example() -> None:
+def page_of(slot: Slot[Any]) -> Path:
+    name = slot.hook.removeprefix("contact_")
+    return ROOT / "docs" / "plugins" / f"{TITLES.get(name, name.replace('_', '-'))}.md"
+
+
+def test_every_slot_has_a_page_with_a_plugin_and_its_proof() -> None:
     assert {slot.hook for slot in SLOTS} == {name for name in HOOKS if "choose" not in name} - {
         "contact_document_changed",
         "contact_pose_solved",
     }
     for slot in SLOTS:
-        name = slot.hook.removeprefix("contact_")
-        page = ROOT / "docs" / "plugins" / f"{TITLES.get(name, name.replace('_', '-'))}.md"
-        code = "\n".join(blocks(page, "python"))
-        assert "@hookimpl" in code and slot.hook in code, page.name
-        assert "assert " in code, page.name
+        (plugin, code), (test, proof) = files(page_of(slot)).items()
+        assert test == f"test_{plugin}" and plugin.removesuffix(".py") in proof
+        assert f"@hookimpl\ndef {slot.hook}():" in code
 
 
 def test_a_generator_takes_less_than_thirty_lines() -> None:
-    (code,) = blocks(ROOT / "docs" / "plugins" / "axis-generators.md", "python")
-    body = code[code.index("class FromTheMiddle") : code.index("class TestFromTheMiddle")]
-    assert len([line for line in body.splitlines() if line.strip()]) < 30
+    code, _ = files(ROOT / "docs" / "plugins" / "axis-generators.md").values()
+    assert len([line for line in code.splitlines() if line.strip()]) < 30
 
 
-def test_the_page_on_generators_is_a_plugin_that_keeps_the_contract(tmp_path: Path) -> None:
-    """Step by step, as a new author: the page's code in a file, and pytest over it."""
-    (code,) = blocks(ROOT / "docs" / "plugins" / "axis-generators.md", "python")
-    tmp_path.joinpath("test_mine.py").write_text(code, encoding="utf-8")
+@pytest.fixture(scope="module")
+def pasted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files of all pages, as a new author copies them."""
+    folder = tmp_path_factory.mktemp("pasted")
+    for slot in SLOTS:
+        for name, code in files(page_of(slot)).items():
+            folder.joinpath(name).write_text(code, encoding="utf-8")
+    return folder
+
+
+def typed(line: str, folder: Path, **variables: str) -> str:
+    """What a shell line prints in a folder, with the programs of this environment; it must succeed."""
+    if shutil.which("bash") is None:
+        pytest.skip("the pages' shell lines are for bash")
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    environment = {**os.environ, "PATH": path, "PYTHONDONTWRITEBYTECODE": "1", **variables}
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--contact-report-file", "r.json"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert run.returncode == 0, run.stdout[-2000:]
-    assert json.loads((tmp_path / "r.json").read_text())["broken"] == {"FromTheMiddle": []}
+        ["bash", "-ec", line], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    return run.stdout
+
+
+def test_the_steps_for_a_new_author_work(pasted: Path, tmp_path: Path) -> None:
+    """The page's shell lines, typed in an empty folder that holds the two files of one page."""
+    for name in files(page_of(AXIS_GENERATORS)):
+        (tmp_path / name).write_bytes((pasted / name).read_bytes())
+    first, _ = blocks(ROOT / "docs" / "plugins" / "index.md", "bash")
+    told = typed(first, tmp_path)
+    assert "house_axes  (CONTACT_PLUGINS=house_axes, environment)\n    axis generator: from_the_middle" in told
+    assert "axis generator FromTheMiddle" in told and "BROKEN" not in told
+
+
+def test_every_pasted_plugin_is_listed_without_a_problem(pasted: Path) -> None:
+    modules = {next(iter(files(page_of(slot)))).removesuffix(".py"): slot for slot in SLOTS}
+    told = typed("contact plugins --json", pasted, PYTHONPATH=".", CONTACT_PLUGINS=",".join(modules))
+    records = {record["name"]: record for record in json.loads(told)}
+    for name, slot in modules.items():
+        assert records[name]["problems"] == [], name
+        assert list(records[name]["offers"]) == [slot.noun] and records[name]["offers"][slot.noun], name
+
+
+def test_every_pasted_plugin_keeps_its_contract(pasted: Path) -> None:
+    told = typed("pytest -q -p no:cacheprovider --contact-report-file report.json", pasted)
+    assert " passed" in told and "failed" not in told
+    broken = json.loads((pasted / "report.json").read_text(encoding="utf-8"))["broken"]
+    assert len(broken) == len(SUITES) and not any(broken.values()), broken
 
 
 def suite(name: str) -> type[Contract]:
