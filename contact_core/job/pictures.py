@@ -1,6 +1,8 @@
-"""The two pictures of a job, before and after, in world space."""
+"""The three pictures of a job, before, after, and what touches, in world space."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,21 +15,31 @@ from contact_core.pose.rig import Pose
 
 SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 LINES_PER_PATCH = 14
-NEAR = 0.6  # of the length: how much of the object round the contacts is in the frame
+THROUGH = 0.25  # opacity of the hand that one looks through
+NEAR = 0.4  # of the length: how much of the object round the contacts is in the frame
 
 Rows = tuple[tuple[str, str, bool], ...]
 
 
 def pictures_of(job: Job, rows: Rows) -> list[Picture]:
-    """The manipulator open and away with the contacts painted on both, and posed with the table of results."""
+    """The open hand away from the object, with the contacts painted on both and the table of results; the solved
+    pose; and the same through the hand, so that one sees where it touches."""
     away = job.start_distance / job.length
     before = f"{job.recipe.title or job.recipe.name}: before, {away:.1f} lengths away" if away else "before"
     verdict = "a grasp" if job.verdict.is_grasp else "NOT a good grasp"
-    after = f"after: {verdict}; {job.metrics['contacts']} contact points, {len(job.solution.theta)} dofs"
-    return [_picture(job, job.start, before, ()), _picture(job, job.pose, after, rows)]
+    after = f"after: {job.metrics['contacts']} contact points, {len(job.solution.theta)} dofs"
+    legend = tuple((name, job.session.document.patch(name).color) for name in job.session.document.pairs)
+    judged = (("solved pose", verdict, not job.verdict.is_grasp), *rows)
+    posed = _picture(job, job.pose, after)
+    skin, thing = posed.meshes
+    return [
+        replace(_picture(job, job.start, before), table=judged, legend=legend),
+        posed,
+        replace(posed, meshes=(replace(skin, opacity=THROUGH), thing), caption="where it touches"),
+    ]
 
 
-def _picture(job: Job, pose: Pose, caption: str, rows: Rows) -> Picture:
+def _picture(job: Job, pose: Pose, caption: str) -> Picture:
     skin = posed_skin(job.rig, pose)
     thing = moved(job.object.mesh, job.placed)
     points, lines = [], []
@@ -45,7 +57,6 @@ def _picture(job: Job, pose: Pose, caption: str, rows: Rows) -> Picture:
         camera_from=view.camera_from,
         up=view.up,
         caption=caption,
-        table=rows,
         focus=_focus(skin.points, thing.points, np.concatenate([line[:, 1] for line, _ in lines]), job.length),
     )
 

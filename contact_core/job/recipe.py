@@ -125,7 +125,7 @@ class ViewSpec:
 
     camera_from: Vector | None = None
     up: Vector = (0.0, 1.0, 0.0)
-    size: tuple[int, int] = (1280, 720)
+    size: tuple[int, int] = (1600, 640)
 
 
 @dataclass(frozen=True)

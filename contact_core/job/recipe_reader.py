@@ -243,7 +243,7 @@ def _accept(table: Table) -> dict[str, float]:
 
 
 def _view(table: Table) -> ViewSpec:
-    size = table.counts("size", [1280, 720])
+    size = table.counts("size", [1600, 640])
     if len(size) != 2 or not all(64 <= n <= 8192 for n in size):
         raise InvalidInput(
             f"{table.where}.size must be [width, height] of 64 to 8192 pixels, but {list(size)} came."

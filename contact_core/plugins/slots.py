@@ -67,7 +67,7 @@ class PictureMesh:
 class Picture:
     """All that a renderer needs, in world space: meshes, coloured points, line segments, camera, caption.
 
-    focus: (k, 3) what has to be in the frame; all meshes by default.
+    focus: (k, 3) what has to be in the frame; all meshes by default. table and legend stand above the scene.
     """
 
     meshes: tuple[PictureMesh, ...]
@@ -78,6 +78,7 @@ class Picture:
     caption: str = ""
     table: tuple[tuple[str, str, bool], ...] = ()  # name, value, failed
     focus: FloatArray | None = None
+    legend: tuple[tuple[str, tuple[float, float, float]], ...] = ()  # name, colour
 
 
 @runtime_checkable

@@ -16,7 +16,7 @@ from contact_builtins.renderers.software import OVERSAMPLE, SoftwareRenderer, dr
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
-from contact_core.plugins.camera import camera_of
+from contact_core.plugins.camera import LEGEND_AT, LEGEND_ROWS, ROW, camera_of, legend_rows, rows_above
 from contact_core.plugins.slots import Picture, PictureMesh
 from contact_core.testing.meshes import icosphere, torus
 
@@ -63,7 +63,7 @@ def test_a_pixel_is_covered_where_its_ray_hits(
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
     focal = 0.5 * SIZE[1] / np.tan(camera.field_of_view / 2)
     seen = np.stack(
-        [(x - SIZE[0] / 2 * (1 + camera.shift)) / focal, -(y - SIZE[1] / 2) / focal, -np.ones_like(x)], -1
+        [(x - SIZE[0] / 2) / focal, -(y - SIZE[1] / 2 * (1 + camera.drop)) / focal, -np.ones_like(x)], -1
     )
     rays = seen.reshape(-1, 3) @ camera.camera_from_world
     hit = Locator.of(mesh).cast(np.tile(camera.eye, (len(rays), 1)), rays).hit.reshape(SIZE[::-1])
@@ -110,6 +110,36 @@ def test_failed_rows_are_red_and_letters_differ() -> None:
     masks = {text_mask(chr(code)).tobytes() for code in range(32, 127)}
     assert len(masks) == 95
     assert text_mask("ab", 2).shape == (2 * CELL_HEIGHT, 4 * CELL_WIDTH)
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (1.0, 0.4, 0.2), (0.3, -1.0, 0.1)])
+@pytest.mark.parametrize("size", [(500, 600), (900, 500)])
+def test_nothing_of_the_scene_lies_under_its_texts(
+    direction: tuple[float, float, float], size: tuple[int, int]
+) -> None:
+    """Whatever the view and the frame: the focus stays below table and legend, and above the caption."""
+    grey = (0.5, 0.5, 0.5)
+    for table, legend in ((15, 3), (2, 9), (0, 30)):
+        picture = Picture(
+            (PictureMesh(torus(), RED),),
+            camera_from=direction,
+            table=(("a", "b", False),) * table,
+            legend=(("palm", grey),) * legend,
+            caption="a torus",
+        )
+        seen = np.flatnonzero(covered(draw(picture, size)).any(axis=1))
+        row = ROW * size[1]
+        assert seen[0] >= 8 + rows_above(picture) * row and seen[-1] <= size[1] - 1.3 * row
+        assert legend <= LEGEND_ROWS or legend_rows(picture)[-1] == ("and 20 more", None)
+
+
+def test_the_legend_shows_each_colour_beside_its_name() -> None:
+    ball = PictureMesh(icosphere(1), (0.5, 0.5, 0.5))
+    image = draw(Picture((ball,), legend=(("thumb", RED), ("palm", BLUE))), (400, 360)).astype(int)
+    left = int(LEGEND_AT * 400)
+    for place, color in enumerate((RED, BLUE)):
+        square = image[8 + int(place * ROW * 360) + 3, left + 3]
+        np.testing.assert_allclose(square, np.array(color) * 255, atol=1)
 
 
 def test_pictures_stand_side_by_side(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.plugins.camera import camera_of
+from contact_core.plugins.camera import LEGEND_AT, ROW, WIDEST_NAME, camera_of, legend_rows
 from contact_core.plugins.slots import Picture
 from contact_viewer.scene_file import read_scene
 
@@ -51,7 +51,11 @@ def draw(pictures: list[Picture], size: tuple[int, int], path: Path) -> None:
         plotter.subplot(0, place)
         plotter.set_background(_BOTTOM, top=_TOP)
         _fill(plotter, pyvista, picture, aspect=size[0] / len(pictures) / size[1], pixels=large[1])
-    _save(plotter.screenshot(return_img=True), path)
+    image = np.array(plotter.screenshot(return_img=True))  # (height, width, 3)
+    for place, picture in enumerate(pictures):
+        width = large[0] // len(pictures)
+        _colour_legend(image[:, place * width : (place + 1) * width], picture)
+    _save(image, path)
 
 
 def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels: int) -> None:
@@ -84,10 +88,10 @@ def _fill(plotter: Any, pyvista: Any, picture: Picture, *, aspect: float, pixels
     plotter.camera.position = camera.eye
     plotter.camera.focal_point = camera.centre
     plotter.camera.up = camera.camera_from_world[1]
-    plotter.camera.SetWindowCenter(-camera.shift, 0.0)
+    plotter.camera.SetWindowCenter(0.0, camera.drop)
     plotter.camera.view_angle = np.degrees(camera.field_of_view)
     plotter.reset_camera_clipping_range()
-    _write(plotter, picture, pixels)
+    _write(plotter, picture, pixels, width=int(aspect * pixels))
 
 
 def _light(plotter: Any, pyvista: Any, axes: Any, centre: Any, distance: float) -> None:
@@ -102,17 +106,43 @@ def _light(plotter: Any, pyvista: Any, axes: Any, centre: Any, distance: float) 
         plotter.add_light(light, only_active=True)  # or every picture beside it is lit again
 
 
-def _write(plotter: Any, picture: Picture, pixels: int) -> None:
-    """The table from the top left, the caption along the bottom."""
-    size = max(24, pixels // 75)
-    line = size * 1.7
+def _write(plotter: Any, picture: Picture, pixels: int, width: int) -> None:
+    """The table from the top left, the legend to its right, the caption along the bottom."""
+    size, line = _type(pixels)
+
+    def say(text: str, x: float, y: float, ink: Any) -> None:
+        said = plotter.add_text(text, position=(x, y), font_size=size / 2, color=ink, font="arial")
+        said.prop.background_color, said.prop.background_opacity = _TOP, 0.6  # a pole may stand behind it
+
     for place, (name, value, failed) in enumerate(picture.table):
-        ink = _ALARM if failed else _INK
+        ink, y = _ALARM if failed else _INK, pixels - (place + 1.4) * line
+        if len(name) > WIDEST_NAME:
+            say(f"{name}: {value}", size, y, ink)
+        else:
+            say(name, size, y, ink)
+            say(value, size * 16, y, ink)
+    left = LEGEND_AT * width
+    for place, (name, _) in enumerate(legend_rows(picture)):
         y = pixels - (place + 1.4) * line
-        plotter.add_text(name, position=(size, y), font_size=size / 2, color=ink, font="arial")
-        plotter.add_text(value, position=(size * 16, y), font_size=size / 2, color=ink, font="arial")
+        say(name, left + 1.6 * size, y, _INK)
     if picture.caption:
-        plotter.add_text(picture.caption, position=(size, size * 0.8), font_size=size / 2, color=_INK, font="arial")
+        say(picture.caption, size, 0.5 * line, _INK)
+
+
+def _type(pixels: int) -> tuple[float, float]:
+    """Height of letters and of rows in a frame of so many pixels in height."""
+    size = max(20.0, 0.6 * ROW * pixels)  # smaller letters cannot be read once the picture is half as large
+    return size, max(ROW * pixels, 1.6 * size)
+
+
+def _colour_legend(frame: Any, picture: Picture) -> None:
+    """A square of its colour before each name of the legend, in the frame (height, width, 3) of this picture."""
+    size, line = _type(frame.shape[0])
+    left = int(LEGEND_AT * frame.shape[1])
+    for place, (_, color) in enumerate(legend_rows(picture)):
+        top = int((place + 1.4) * line - size)
+        if color is not None:
+            frame[top : top + int(size), left : left + int(size)] = np.asarray(color) * 255
 
 
 def _save(image: Any, path: Path) -> None:

@@ -39,6 +39,7 @@ def write_scene(path: Path, pictures: Sequence[Picture], size: tuple[int, int]) 
             "up": picture.up,
             "caption": picture.caption,
             "table": picture.table,
+            "legend": picture.legend,
             "focus": None if picture.focus is None else keep(picture.focus),
         }
         for picture in pictures
@@ -68,6 +69,7 @@ def read_scene(path: Path) -> tuple[list[Picture], tuple[int, int]]:
                 up=tuple(one["up"]),
                 caption=one["caption"],
                 table=tuple((name, value, bool(failed)) for name, value, failed in one["table"]),
+                legend=tuple((name, tuple(color)) for name, color in one["legend"]),
                 focus=None if one["focus"] is None else stored[one["focus"]],
             )
             for one in scene["pictures"]

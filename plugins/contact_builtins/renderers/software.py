@@ -16,7 +16,7 @@ from contact_builtins.renderers.font import CELL_HEIGHT, text_mask
 from contact_builtins.renderers.png import write_png
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.plugins.camera import Camera, camera_of
+from contact_core.plugins.camera import LEGEND_AT, ROW, WIDEST_NAME, Camera, camera_of, legend_rows
 from contact_core.plugins.slots import Picture, PictureMesh
 
 OVERSAMPLE = 2
@@ -74,8 +74,8 @@ class _Canvas:
         """(n, 3) pixel x, pixel y and depth of world points (n, 3)."""
         seen = (points - self.camera.eye) @ self.camera.camera_from_world.T
         depth = np.maximum(-seen[:, 2], 1e-9)
-        x = 0.5 * self.width * (1.0 + self.camera.shift) + self.focal * seen[:, 0] / depth
-        y = 0.5 * self.height - self.focal * seen[:, 1] / depth
+        x = 0.5 * self.width + self.focal * seen[:, 0] / depth
+        y = 0.5 * self.height * (1.0 + self.camera.drop) - self.focal * seen[:, 1] / depth
         return np.stack([x, y, depth], axis=1)
 
     def mesh(self, item: PictureMesh) -> None:
@@ -165,15 +165,23 @@ def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
 
 
 def _write_text(image: FloatArray, picture: Picture) -> None:
-    """Table rows from the top left, the caption along the bottom; red for what failed."""
-    scale = max(1, image.shape[0] // 450)
-    line = (CELL_HEIGHT + 2) * scale
-    rows = [(f"{name:<23.23} {value}", _ALARM if failed else _INK) for name, value, failed in picture.table]
-    for place, (text, ink) in enumerate(rows):
-        _stamp(image, text, 8, 8 + place * line, scale, ink)
-    _stamp(image, picture.caption, 8, image.shape[0] - line - 4, scale, _INK)
+    """Table rows from the top left, the legend beside them, the caption along the bottom; red for what failed."""
+    line = ROW * image.shape[0]
+    scale = max(1, int(line) // (CELL_HEIGHT + 1))
+    for place, (name, value, failed) in enumerate(picture.table):
+        text, ink = f"{name:<{WIDEST_NAME}} {value}", _ALARM if failed else _INK
+        _stamp(image, text, 8, 8 + int(place * line), scale, ink)
+    left = int(LEGEND_AT * image.shape[1])
+    for place, (name, color) in enumerate(legend_rows(picture)):
+        y = 8 + int(place * line)
+        if color is not None:
+            image[y + scale : y + 7 * scale, left : left + 6 * scale] = color
+        _stamp(image, name, left + 9 * scale, y, scale, _INK)
+    _stamp(image, picture.caption, 8, image.shape[0] - int(1.3 * line), scale, _INK)
 
 
 def _stamp(image: FloatArray, text: str, x: int, y: int, scale: int, ink: FloatArray) -> None:
     mask = text_mask(text, scale)[: max(0, image.shape[0] - y), : max(0, image.shape[1] - x)]
-    image[y : y + mask.shape[0], x : x + mask.shape[1]][mask] = ink
+    under = image[y : y + mask.shape[0], x : x + mask.shape[1]]
+    under += 0.6 * (_TOP - under)  # a pole may stand behind it
+    under[mask] = ink

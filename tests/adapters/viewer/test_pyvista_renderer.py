@@ -28,6 +28,7 @@ def scene() -> Picture:
         camera_from=(0.0, 0.0, 1.0),
         caption="a ball",
         table=(("gap", "2 %", True),),
+        legend=(("palm", (0.9, 0.8, 0.1)),),
         focus=ball.points,
     )
 
@@ -42,8 +43,8 @@ def test_a_scene_survives_the_way_to_the_child(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.lines[0][0], picture.lines[0][0])
     assert back.focus is not None
     np.testing.assert_array_equal(back.focus, picture.focus)
-    assert (back.table, back.caption, back.up, back.camera_from) == (
-        picture.table, picture.caption, picture.up, picture.camera_from,
+    assert (back.table, back.legend, back.caption, back.up, back.camera_from) == (
+        picture.table, picture.legend, picture.caption, picture.up, picture.camera_from,
     )  # fmt: skip
 
 
@@ -64,6 +65,8 @@ def test_it_draws_what_it_was_given(tmp_path: Path) -> None:
         assert 0.1 < red.mean() < 0.8
         assert (panel[..., 1] > panel[..., 0] + 60).any()  # the point
         assert (panel[..., 2] > panel[..., 0] + 60).any()  # the line
+        yellow = np.abs(panel - np.array([0.9, 0.8, 0.1]) * 255).max(axis=2) < 12
+        assert yellow.any() and np.nonzero(yellow)[0].max() < 30  # the legend, at the top
 
 
 DEATHS = {

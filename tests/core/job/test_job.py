@@ -130,9 +130,12 @@ def test_a_job_writes_its_files_and_they_can_be_read_again(tmp_path: Path) -> No
         np.testing.assert_array_equal(pose["joints"][name], local)
     assert len(document.pairs) == len(report["patches"])
 
-    before, after = sketch.pictures
-    assert len(before.points) == len(after.points) == 2 * len(report["patches"])
-    assert after.table and not before.table
+    before, after, through = sketch.pictures
+    assert len(before.points) == len(after.points) == len(through.points) == 2 * len(report["patches"])
+    assert before.table[0][:2] == ("solved pose", "a grasp")
+    assert [name for name, _ in before.legend] == list(report["patches"])
+    assert len({color for _, color in before.legend}) == len(before.legend)
+    assert through.meshes[0].opacity < 1.0 == through.meshes[1].opacity
     for pair in before.lines:  # pair lines join skin and object: long before, short after
         assert np.linalg.norm(pair[0][:, 1] - pair[0][:, 0], axis=1).min() > 0.5 * report["manipulator_length"]
 
