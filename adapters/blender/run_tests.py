@@ -28,6 +28,23 @@ PATIENCE = 600  # seconds for one process of Blender
 LAST_WORDS = 20  # seconds for a process that hangs to say where
 INSTALLING = 3600  # seconds to fetch and unpack a wheel of 400 MB
 MATRIX = ("4.5", "5.0", "5.2")
+# Runs a script and leaves without Blender's own end, which as a module now and then crashes (4.2) or hangs (4.5).
+SCRIPT = """
+import os, runpy, sys, traceback
+sys.argv = sys.argv[1:]
+sys.path[0] = os.path.dirname(sys.argv[0])
+code = 1
+try:
+    runpy.run_path(sys.argv[0], run_name="__main__")
+    code = 0
+except SystemExit as end:
+    code = end.code if isinstance(end.code, int) else int(end.code is not None)
+except BaseException:
+    traceback.print_exc()
+finally:
+    sys.stdout.flush(), sys.stderr.flush()
+    os._exit(code)
+"""
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -70,7 +87,7 @@ def run(python: Path, tests: list[str], *options: str, **variables: str) -> subp
 
 def run_script(python: Path, script: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """One script in a Blender environment."""
-    return _started(python, [str(script), *arguments], {})
+    return _started(python, ["-c", SCRIPT, str(script.resolve()), *arguments], {})
 
 
 def _started(python: Path, command: list[str], variables: dict[str, str]) -> subprocess.CompletedProcess[str]:

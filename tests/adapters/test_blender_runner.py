@@ -45,6 +45,27 @@ os._exit(3)
         assert "contact-blender-" in str(folder) and not folder.exists()
 
 
+@pytest.mark.parametrize(
+    ("end", "code", "word"),
+    [("", 0, ""), ("sys.exit(7)", 7, ""), ("sys.exit('no')", 1, ""), ("1 / 0", 1, "ZeroDivisionError")],
+)
+def test_a_script_ends_before_its_program_does(
+    end: str, code: int, word: str, run_tests: ModuleType, tmp_path: Path
+) -> None:
+    """Blender's own end as a module is not to be trusted; arguments, neighbours and exit codes are as ever."""
+    (tmp_path / "neighbour.py").write_text("NAME = 'next door'")
+    text = f"""
+import atexit, sys
+from neighbour import NAME
+atexit.register(lambda: print("the end of the program"))
+print(NAME, sys.argv[1:], __name__)
+{end}
+"""
+    done = run_tests.run_script(PYTHON, script(tmp_path, text), "one", "two")
+    assert done.stdout == "next door ['one', 'two'] __main__\n"
+    assert done.returncode == code and word in done.stderr
+
+
 def test_a_process_that_hangs_is_ended_in_words(
     run_tests: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
