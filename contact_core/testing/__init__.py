@@ -19,4 +19,4 @@ except ImportError as error:
 SUITES = ("host", "solver", "term", "axis_generator", "brush", "engine", "command", "format")
 
 # Without this, an inherited test that fails prints a bare AssertionError instead of its values.
-pytest.register_assert_rewrite(*(f"{__name__}.{suite}_contract" for suite in SUITES))
+pytest.register_assert_rewrite(f"{__name__}.host_clauses", *(f"{__name__}.{suite}_contract" for suite in SUITES))

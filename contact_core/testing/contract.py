@@ -105,16 +105,19 @@ def clause_table(suite: type[Contract]) -> str:
 
 
 def _check_suite(suite: type[Contract]) -> None:
-    """Every test of a suite is a clause with a sentence, numbered 1, 2, 3 ... in the order of the file."""
-    tests = [name for name in vars(suite) if name.startswith("test_")]
-    for number, name in enumerate(tests, start=1):
+    """Every test of a suite is a clause with a sentence, numbered 1, 2, 3 ... in the order in which they are run:
+    those of its bases from the last to the first, then its own."""
+    tests = {
+        name: test for base in reversed(suite.__mro__) for name, test in vars(base).items() if name[:5] == "test_"
+    }
+    for number, (name, test) in enumerate(tests.items(), start=1):
         expected = f"test_{suite.letter.lower()}{number:02d}_"
         if not (name.startswith(expected) and _CLAUSE_NAME.fullmatch(name)):
             raise InvalidInput(
                 f"{suite.__name__}: clauses count up in the order of the file; a name starting with"
                 f" {expected} was wanted, but {name} came."
             )
-        if not (vars(suite)[name].__doc__ or "").strip():
+        if not (test.__doc__ or "").strip():
             raise InvalidInput(f"{suite.__name__}.{name} needs a docstring: its clause in words.")
 
 
