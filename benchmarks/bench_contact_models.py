@@ -111,7 +111,7 @@ def portrait(
         color = even + abs(amount) * ((grown if amount > 0.0 else shrunk) - even)
         chosen = (octaves == amount) & ~found.folded
         batches.append((where[chosen], (float(color[0]), float(color[1]), float(color[2]))))
-    body = PictureMesh(target, (0.3, 0.32, 0.35))
+    body = PictureMesh(target, (0.62, 0.65, 0.7))  # light, so that folds in black stand out
     return Picture((body,), points=tuple(batches), camera_from=side, up=(0.0, 0.0, 1.0), caption=caption)
 
 

@@ -17,7 +17,8 @@ from contact_core.geometry.tangent import direction_to_heading, heading_to_direc
 def reflected(vectors: FloatArray, normal: Any, offset: float = 0.0) -> FloatArray:
     """Points or (with offset 0) directions (k, 3) reflected in the plane of points x with normal . x = offset."""
     n = frozen(normal, np.float64, (3,), "the normal of a mirror plane")
-    length = float(np.linalg.norm(n))
+    largest = float(np.abs(n).max())
+    length = largest * float(np.linalg.norm(n / (largest or 1.0)))
     if not 0.0 < length < np.inf:
         raise InvalidInput(f"the normal of a mirror plane is a direction, but {n.tolist()} came.")
     n = n / length

@@ -47,7 +47,8 @@ class Surface:
         matrix = frozen(self.world_from_surface, np.float64, (4, 4), "world_from_surface")
         object.__setattr__(self, "world_from_surface", matrix)
         turn = matrix[:3, :3]
-        if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-6 or np.linalg.det(turn) < 0.0:
+        rigid = np.abs(turn).max() < 1.1 and np.abs(turn @ turn.T - np.eye(3)).max() <= 1e-6
+        if not rigid or np.linalg.det(turn) < 0.0 or np.abs(matrix[3] - [0.0, 0.0, 0.0, 1.0]).max() > 1e-9:
             raise InvalidInput(
                 f"world_from_surface of {self.name!r} must be rigid: apply scale and shear to the points instead."
             )

@@ -6,62 +6,36 @@ cannot escape the laws.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from contact_core.contact.placement import Link, Placement, Root
-from contact_core.contact.shape import AxisShape, PatchCoordinates, PatchShape
-from contact_core.document.document import ContactDocument, ContactPair, Patch, Surface
+from contact_core.contact.placement import Link, Root
+from contact_core.document.document import ContactDocument, ContactPair
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit import commands as kinds
 from contact_core.edit.command import Command
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected
 from contact_core.pose.rig import Pose
+from contact_core.testing.random_values import (
+    Rng,
+    moved_placement,
+    new_patch,
+    new_surface,
+    pick,
+    pick_patch,
+    pick_surface,
+    random_coordinates,
+    random_link,
+    random_motion,
+    random_root,
+    random_shape,
+)
 
-Rng = np.random.Generator
 Maker = Callable[[ContactDocument, Rng], Command | None]
-
-
-def random_shape(rng: Rng, points: int | None = None) -> PatchShape:
-    """A shape with an axis of 1 to 6 points and some chains."""
-    segments, n = int(rng.integers(0, 6)), int(points or rng.integers(1, 9))
-    axis = AxisShape(rng.uniform(0.1, 1.0, segments), rng.uniform(-1.0, 1.0, max(segments - 1, 0)))
-    return PatchShape(axis, random_coordinates(rng, n, axis.point_count), rng.uniform(0.0, 2.0, n))
-
-
-def random_coordinates(rng: Rng, n: int, axis_points: int) -> PatchCoordinates:
-    """Coordinates of n points from an axis of so many points."""
-    bends = rng.choice([0, 0, 0, 1, 2], n)
-    starts = np.concatenate([[0], np.cumsum(bends)])
-    legs = rng.uniform(-1.0, 1.0, n) + 1j * rng.uniform(-1.0, 1.0, n)
-    c = int(starts[-1])
-    return PatchCoordinates(
-        rng.integers(0, axis_points, n), legs, starts, rng.uniform(-1.0, 1.0, c), rng.uniform(0.0, 1.0, c)
-    )
-
-
-def random_root(rng: Rng, surface: Surface) -> Root:
-    """A root somewhere on a surface."""
-    a, b, c = rng.dirichlet(np.ones(3)).tolist()
-    return Root(int(rng.integers(surface.faces)), (a, b, c), complex(np.exp(1j * rng.uniform(-3.0, 3.0))))
-
-
-def random_link(rng: Rng, document: ContactDocument, parent: str, child: Patch) -> Link:
-    """A link that fits both axes."""
-    turns = int(rng.integers(0, 3))
-    return Link(
-        parent,
-        float(rng.uniform(-3.0, 3.0)),
-        tuple(rng.uniform(0.0, 1.0, turns + 1).tolist()),
-        tuple(rng.uniform(-1.0, 1.0, turns).tolist()),
-        float(rng.uniform(-3.0, 3.0)),
-        int(rng.integers(document.shape_of(parent).axis.point_count)),
-        int(rng.integers(document.shapes[child.shape].axis.point_count)),
-    )
 
 
 def random_command(document: ContactDocument, rng: Rng, json_id: str | None = None) -> Command | None:
@@ -98,105 +72,70 @@ def try_to_do(history: History, command: Command, **arguments: Any) -> bool:
     return True
 
 
-def _pick(rng: Rng, items: Sequence[Any]) -> Any:
-    return items[int(rng.integers(len(items)))] if len(items) else None
-
-
-def _patch(document: ContactDocument, rng: Rng) -> Patch | None:
-    patch: Patch | None = _pick(rng, list(document.patches.values()))
-    return patch
-
-
-def _surface(document: ContactDocument, rng: Rng) -> Surface | None:
-    surface: Surface | None = _pick(rng, list(document.surfaces.values()))
-    return surface
-
-
-def _new_surface(rng: Rng, name: str) -> Surface:
-    rig = str(_pick(rng, ["hand", "tentacle"])) if rng.random() < 0.7 else None
-    unit = float(_pick(rng, [1.0, 0.01]))
-    return Surface(name, f"{rng.integers(1 << 30):x}", "topology", 50, int(rng.integers(5, 90)), unit, rig=rig)
-
-
-def _new_patch(document: ContactDocument, rng: Rng, name: str, surface: Surface) -> Patch:
-    color = tuple(rng.uniform(0.0, 1.0, 3).tolist())
-    key = document.free_name(name, document.shapes)
-    return Patch(name, surface.name, key, random_root(rng, surface), color=color)
-
-
-def _moved(document: ContactDocument, rng: Rng, patch: Patch) -> Placement:
-    if isinstance(patch.placement, Link):
-        return random_link(rng, document, patch.placement.parent, patch)
-    return random_root(rng, document.surface(patch.surface))
-
-
-def _turn(rng: Rng) -> Any:
-    angle = rng.uniform(-3.0, 3.0)
-    matrix = np.eye(4)
-    matrix[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    matrix[:3, 3] = rng.uniform(-1.0, 1.0, 3)
-    return matrix
-
-
 def add_surface(document: ContactDocument, rng: Rng) -> Command | None:
-    return kinds.AddSurface(_new_surface(rng, document.free_name("surface", document.surfaces)))
+    return kinds.AddSurface(new_surface(rng, document.free_name("surface", document.surfaces)))
 
 
 def remove_surface(document: ContactDocument, rng: Rng) -> Command | None:
     used = {patch.surface for patch in document.patches.values()}
-    name = _pick(rng, [name for name in document.surfaces if name not in used])
+    name = pick(rng, [name for name in document.surfaces if name not in used])
     return kinds.RemoveSurface(name) if name and len(document.surfaces) > 2 else None
 
 
 def rename_surface(document: ContactDocument, rng: Rng) -> Command | None:
-    surface = _surface(document, rng)
+    surface = pick_surface(document, rng)
     return kinds.RenameSurface(surface.name, document.free_name("renamed", document.surfaces)) if surface else None
 
 
 def place_surface(document: ContactDocument, rng: Rng) -> Command | None:
-    surface = _surface(document, rng)
-    return kinds.PlaceSurface(surface.name, _turn(rng)) if surface else None
+    surface = pick_surface(document, rng)
+    return kinds.PlaceSurface(surface.name, random_motion(rng)) if surface else None
 
 
 def rebind_surface(document: ContactDocument, rng: Rng) -> Command | None:
-    surface = _surface(document, rng)
+    surface = pick_surface(document, rng)
     if surface is None:
         return None
-    new = replace(_new_surface(rng, surface.name), rig=surface.rig)
+    new = replace(new_surface(rng, surface.name), rig=surface.rig)
     roots = [patch for patch in document.patches.values() if patch.surface == new.name]
     places = tuple((p.name, random_root(rng, new)) for p in roots if isinstance(p.placement, Root))
     owned = {patch.shape for patch in roots if patch.original}
-    shapes = {key: replace(document.shapes[key], weights=document.shapes[key].weights * 0.5) for key in owned}
+    shapes = {
+        key: replace(document.shapes[key], weights=document.shapes[key].weights * 0.5)
+        if rng.random() < 0.7
+        else random_shape(rng, len(document.shapes[key]))  # another axis, of more points or fewer
+        for key in owned
+    }
     return kinds.RebindSurface(new, FrozenMap(shapes), places)
 
 
 def settle(document: ContactDocument, rng: Rng) -> Command | None:
     patches = [patch for patch in document.patches.values() if rng.random() < 0.5]
     posed = [command for command in (set_pose(document, rng),) if isinstance(command, kinds.SetPose)]
-    placements = tuple((patch.name, _moved(document, rng, patch)) for patch in patches)
+    placements = tuple((patch.name, moved_placement(document, rng, patch)) for patch in patches)
     return kinds.Settle(placements, FrozenMap({command.surface: command.pose for command in posed}))
 
 
 def set_pose(document: ContactDocument, rng: Rng) -> Command | None:
-    surface = _pick(rng, [s for s in document.surfaces.values() if s.rig])
+    surface = pick(rng, [s for s in document.surfaces.values() if s.rig])
     local = np.tile(np.eye(4), (2, 1, 1)) + rng.uniform(-0.1, 0.1, (2, 4, 4))
     return kinds.SetPose(surface.name, Pose(("wrist", "thumb"), local)) if surface else None
 
 
 def clear_pose(document: ContactDocument, rng: Rng) -> Command | None:
-    name = _pick(rng, list(document.poses))
+    name = pick(rng, list(document.poses))
     return name and kinds.ClearPose(name)
 
 
 def paint(document: ContactDocument, rng: Rng) -> Command | None:
-    surface = _surface(document, rng)
+    surface = pick_surface(document, rng)
     if surface is None:
         return None
-    return kinds.Paint(_new_patch(document, rng, document.free_name("patch"), surface), random_shape(rng))
+    return kinds.Paint(new_patch(document, rng, document.free_name("patch"), surface), random_shape(rng))
 
 
 def extend(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     if patch is None:
         return None
     n = int(rng.integers(1, 5))
@@ -205,7 +144,7 @@ def extend(document: ContactDocument, rng: Rng) -> Command | None:
 
 
 def erase(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     n = len(document.shapes[patch.shape]) if patch else 0
     if patch is None or n < 2:
         return None
@@ -213,7 +152,7 @@ def erase(document: ContactDocument, rng: Rng) -> Command | None:
 
 
 def reshape(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     if patch is None:
         return None
     shape = random_shape(rng, len(document.shapes[patch.shape]))
@@ -221,12 +160,12 @@ def reshape(document: ContactDocument, rng: Rng) -> Command | None:
 
 
 def weigh(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     return kinds.Weigh(patch.name, rng.uniform(0.0, 1.0, len(document.shapes[patch.shape]))) if patch else None
 
 
 def detach(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     return kinds.Detach(patch.name, document.free_name(patch.name, document.shapes)) if patch else None
 
 
@@ -241,18 +180,18 @@ def remove(document: ContactDocument, rng: Rng) -> Command | None:
 
 
 def translate(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
-    return kinds.Translate(patch.name, _moved(document, rng, patch)) if patch else None
+    patch = pick_patch(document, rng)
+    return kinds.Translate(patch.name, moved_placement(document, rng, patch)) if patch else None
 
 
 def rotate(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
-    return kinds.Rotate(patch.name, _moved(document, rng, patch)) if patch else None
+    patch = pick_patch(document, rng)
+    return kinds.Rotate(patch.name, moved_placement(document, rng, patch)) if patch else None
 
 
 def bend(document: ContactDocument, rng: Rng) -> Command | None:
     bendable = [p for p in document.patches.values() if document.shapes[p.shape].axis.point_count > 2]
-    patch = _pick(rng, bendable)
+    patch = pick(rng, bendable)
     if patch is None:
         return None
     point = int(rng.integers(1, document.shapes[patch.shape].axis.point_count - 1))
@@ -260,35 +199,41 @@ def bend(document: ContactDocument, rng: Rng) -> Command | None:
 
 
 def scale(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     return kinds.Scale(patch.name, *rng.uniform(0.5, 2.0, 2).tolist()) if patch else None
 
 
 def mirror(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     return kinds.Mirror(patch.name, bool(rng.integers(2))) if patch else None
 
 
 def transfer(document: ContactDocument, rng: Rng) -> Command | None:
-    patch, surface = _patch(document, rng), _surface(document, rng)
+    patch, surface = pick_patch(document, rng), pick_surface(document, rng)
     if patch is None or surface is None or len(document.patches) > 12:
         return None
-    copy = _new_patch(document, rng, document.free_name("copy"), surface)
-    return kinds.Transfer((replace(copy, shape=patch.shape, original=False, mirrored=not patch.mirrored),))
+    copy = new_patch(document, rng, document.free_name("copy"), surface)
+    copy = replace(copy, shape=patch.shape, original=False, mirrored=not patch.mirrored)
+    copies = [copy]
+    for name in list(document.children(patch.name))[:2]:  # what hangs on it comes along
+        child = replace(document.patch(name), name=document.free_name(f"{name} too"), surface=surface.name)
+        link = replace(random_link(rng, document, patch.name, child), parent=copy.name)
+        copies.append(replace(child, placement=link, original=False))
+    return kinds.Transfer(tuple(copies))
 
 
 def link(document: ContactDocument, rng: Rng) -> Command | None:
-    child = _patch(document, rng)
+    child = pick_patch(document, rng)
     if child is None:
         return None
     below = {child.name, *document.descendants(child.name)}
     same = [p for p in document.patches.values() if p.surface == child.surface and p.name not in below]
-    parent = _pick(rng, same)
+    parent = pick(rng, same)
     return parent and kinds.LinkPatch(child.name, random_link(rng, document, parent.name, child))
 
 
 def unlink(document: ContactDocument, rng: Rng) -> Command | None:
-    child = _pick(rng, [p for p in document.patches.values() if isinstance(p.placement, Link)])
+    child = pick(rng, [p for p in document.patches.values() if isinstance(p.placement, Link)])
     return child and kinds.Unlink(child.name, random_root(rng, document.surface(child.surface)))
 
 
@@ -300,7 +245,7 @@ def pair(document: ContactDocument, rng: Rng) -> Command | None:
 
 
 def unpair(document: ContactDocument, rng: Rng) -> Command | None:
-    name = _pick(rng, list(document.pairs))
+    name = pick(rng, list(document.pairs))
     return name and kinds.Unpair(name)
 
 
@@ -313,29 +258,31 @@ def group(document: ContactDocument, rng: Rng) -> Command | None:
 
 
 def ungroup(document: ContactDocument, rng: Rng) -> Command | None:
-    name = _pick(rng, list(document.groups))
+    name = pick(rng, list(document.groups))
     return name and kinds.Ungroup(name)
 
 
 def rename(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     return kinds.Rename(patch.name, document.free_name("thumb tip")) if patch else None
 
 
 def recolor(document: ContactDocument, rng: Rng) -> Command | None:
-    patch = _patch(document, rng)
+    patch = pick_patch(document, rng)
     r, g, b = rng.uniform(0.0, 1.0, 3).tolist()
     return kinds.Recolor((patch.name,), (r, g, b)) if patch else None
 
 
 def import_patches(document: ContactDocument, rng: Rng) -> Command | None:
-    surface = _surface(document, rng)
+    surface = pick_surface(document, rng)
     if surface is None or len(document.patches) > 12:
         return None
     shape = random_shape(rng)
-    first = _new_patch(document, rng, document.free_name("brought"), surface)
-    second = _new_patch(document, rng, document.free_name("brought too"), surface)
+    first = new_patch(document, rng, document.free_name("brought"), surface)
+    second = new_patch(document, rng, document.free_name("brought too"), surface)
     second = replace(second, shape=first.shape, original=False)
+    if rng.random() < 0.5:
+        second = replace(second, placement=Link(first.name, 0.3, (0.1, 0.2), (0.5,), 1.0))
     pairs = (ContactPair(document.free_name("brought pair", document.pairs), first.name, second.name),)
     groups: FrozenMap[tuple[str, ...]] = FrozenMap(
         {document.free_name("brought group", document.groups): (first.name, second.name)}
@@ -351,7 +298,8 @@ def set_extra(document: ContactDocument, rng: Rng) -> Command | None:
 def macro(document: ContactDocument, rng: Rng) -> Command | None:
     first = bend(document, rng) or recolor(document, rng)
     second = set_extra(document, rng)
-    return first and second and kinds.Macro("Two at once", (first, second))
+    inner = kinds.Macro("Within", (second,)) if second and rng.random() < 0.5 else second
+    return first and inner and kinds.Macro("Two at once", (first, inner))
 
 
 MAKERS: dict[str, Maker] = {

@@ -25,7 +25,8 @@ from contact_core.edit.commands import AddSurface, Bend, LinkPatch, Paint, Recol
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected, FileRefused, InvalidInput
 from contact_core.testing.command_contract import CommandCase, CommandContract
-from contact_core.testing.random_commands import MAKERS, random_command, random_history, random_shape, try_to_do
+from contact_core.testing.random_commands import MAKERS, random_command, random_history, try_to_do
+from contact_core.testing.random_values import random_shape
 
 
 @cache

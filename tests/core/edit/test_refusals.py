@@ -125,7 +125,12 @@ CASES: list[tuple[str, Callable[[Session], object]]] = [
     ("rename", lambda s: s.rename("palm", "\x1b[2J")),
     ("recolor", lambda s: s.recolor("palm", (0.0, 0.0, 2.0))),
     ("recolor", lambda s: s.recolor("palm", None)),  # type: ignore[arg-type]
-    ("place_surface", lambda s: s.place_surface("torus", 2.0 * np.eye(4))),
+    ("place_surface", lambda s: s.place_surface("torus", np.diag([2.0, 2.0, 2.0, 1.0]))),
+    ("place_surface", lambda s: s.place_surface("torus", np.diag([1.0, 1.0, -1.0, 1.0]))),
+    ("place_surface", lambda s: s.place_surface("torus", np.diag([1e300, 1.0, 1.0, 1.0]))),
+    ("place_surface", lambda s: s.place_surface("torus", np.eye(4) + np.eye(4, k=-1))),
+    ("place_surface", lambda s: s.place_surface("torus", np.vstack([np.eye(4)[:3], np.ones(4)]))),
+    ("place_surface", lambda s: s.place_surface("torus", np.eye(3))),
     ("set_pose", lambda s: s.set_pose("torus", Pose(("a",), np.eye(4)[None]))),
     ("clear_pose", lambda s: s.clear_pose("torus")),
     ("set_extra", lambda s: s.set_extra("host", NAN)),
