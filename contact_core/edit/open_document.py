@@ -8,7 +8,7 @@ from pathlib import Path
 from contact_core.document.lock import DocumentLock
 from contact_core.edit.history import History, Step
 from contact_core.edit.journal import Journal
-from contact_core.edit.recovery import digest_of, journal_path, open_file, set_aside, write_document
+from contact_core.edit.recovery import digest_of, journal_path, keep_foreign, open_file, set_aside, write_document
 from contact_core.errors import FileRefused
 
 
@@ -27,10 +27,12 @@ class OpenDocument:
         lock: DocumentLock | None,
         notes: tuple[str, ...] = (),
         read_only: str | None = None,
+        digest: str | None = None,
     ) -> None:
         self.path = path
         self.notes = notes
         self.read_only = read_only
+        self._digest = digest  # of the file as this session read or wrote it last
         self._journal = journal
         self._lock = lock
 
@@ -38,7 +40,7 @@ class OpenDocument:
     def open(cls, path: Path) -> tuple[OpenDocument, History]:
         """Open a path, replaying an interrupted journal. Raises FileRefused."""
         opened = open_file(real_path(path))
-        document = cls(opened.path, opened.journal, opened.lock, opened.notes, opened.read_only)
+        document = cls(opened.path, opened.journal, opened.lock, opened.notes, opened.read_only, opened.digest)
         return document, opened.history
 
     @classmethod
@@ -57,7 +59,7 @@ class OpenDocument:
             digest = write_document(path, history.document)
             journal = Journal.start(journal_path(path), history, digest)
             journal.saved(history.revision, digest)
-            return cls(path, journal, lock, notes)
+            return cls(path, journal, lock, notes, digest=digest)
         except BaseException:
             lock.release()
             raise
@@ -73,10 +75,16 @@ class OpenDocument:
             self._journal.went(revision)
 
     def save(self, history: History) -> None:
-        """Write the current document, whole or not at all. Raises FileRefused."""
-        digest = write_document(self.path, history.document)
+        """Write the current document, whole or not at all. Raises FileRefused.
+
+        A file that something else wrote meanwhile is kept under another name, and `notes` says so.
+        """
+        kept = keep_foreign(self.path, self._digest)
+        if kept is not None:
+            self.notes += (f"{self.path.name} was changed by something else; that version is kept as {kept}.",)
+        self._digest = write_document(self.path, history.document)
         if self._journal is not None:
-            self._journal.saved(history.revision, digest)
+            self._journal.saved(history.revision, self._digest)
 
     def restart(self, history: History) -> None:
         """Begin the journal anew with a history that did not come out of it. Raises FileRefused."""

@@ -20,7 +20,7 @@ from contact_core.whole_file import read_whole, write_whole
 class OpenedFile:
     """What opening a path gave. journal and lock are None when read-only. notes: sentences for the artist.
 
-    read_only: why nothing can be written, None where it can.
+    read_only: why nothing can be written, None where it can. digest: of the document file, None without one.
     """
 
     path: Path
@@ -29,6 +29,7 @@ class OpenedFile:
     lock: DocumentLock | None
     notes: tuple[str, ...]
     read_only: str | None = None
+    digest: str | None = None
 
 
 def journal_path(path: Path) -> Path:
@@ -84,6 +85,12 @@ def read_only_document(path: Path) -> ContactDocument:
     return read_document(path)[0]
 
 
+def keep_foreign(path: Path, digest: str | None) -> str | None:
+    """Keep a copy of a document file that has another digest; answers its name, None where it has this one."""
+    found = digest_of(path)
+    return None if found in (None, digest) else _keep(path, "replaced", copy=True).name
+
+
 def set_aside(path: Path) -> str | None:
     """Move the journal of a document out of the way of a new one; answers the name that one keeps which was not
     closed in order."""
@@ -117,7 +124,7 @@ def _open_locked(path: Path, lock: DocumentLock) -> OpenedFile:
             f" {kept} (contact replay reads it)."
         )
     history = History(document)
-    return OpenedFile(path, history, Journal.start(beside, history, digest), lock, tuple(notes))
+    return OpenedFile(path, history, Journal.start(beside, history, digest), lock, tuple(notes), digest=digest)
 
 
 def _belongs(old: JournalContents, document: ContactDocument, digest: str | None) -> bool:
@@ -166,7 +173,7 @@ def _resume(
         notes.append(
             f"{path.name} was not closed in order: {steps} committed steps were recovered from its journal."
         )
-    return OpenedFile(path, history, journal, lock, tuple(notes))
+    return OpenedFile(path, history, journal, lock, tuple(notes), digest=digest)
 
 
 def _saved_revision(

@@ -33,7 +33,7 @@ def history_lines(path: Path) -> list[str]:
     for number, step in enumerate(history.steps, start=1):
         mark = ">" if number == done else " " if number < done else "-"
         origin = "" if step.origin == "user" else f"  ({step.origin})"
-        lines.append(f"{mark} {step.revision:5d}  {step.command.label()}{origin}")
+        lines.append(f"{mark} {step.revision:5d}  {_printable(step.command.label() + origin)}")
     lines += [f"! {sentence}" for sentence in (contents.damage, trouble) if sentence]
     lines.append("closed in order" if contents.closed else "not closed: the session runs, or was interrupted")
     return lines
@@ -151,6 +151,11 @@ def _summary(history: History) -> str:
     document = history.document
     parts = [_count(len(document.patches), "patch"), _count(len(document.pairs), "pair")]
     return f"{', '.join(parts)}, {len(dump_document(document))} bytes"
+
+
+def _printable(text: str) -> str:
+    """Titles are free text, and terminals obey what they are sent: what cannot be printed becomes a "?"."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _count(number: int, noun: str) -> str:

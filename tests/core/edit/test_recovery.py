@@ -154,6 +154,26 @@ def test_saving_over_an_interrupted_document_keeps_its_journal(tmp_path: Path) -
     assert dict(kept.document.extras) == {"precious": 1}
 
 
+def test_saving_keeps_what_something_else_wrote_meanwhile(tmp_path: Path) -> None:
+    """Version control brought another version while the session was open; no lock keeps it from that."""
+    path = tmp_path / "document.json"
+    with Session.open(path, discover=False) as session:
+        session.do(SetExtra("a", 1))
+        session.save()
+        session.do(SetExtra("a", 2))
+        session.save()
+        assert session.notes == ()
+        theirs = History(ContactDocument())
+        theirs.do(SetExtra("theirs", 1))
+        write_document(path, theirs.document)
+        session.save()
+        assert session.notes == ("document.json was changed by something else; that version is kept as"
+                                 " document.json.replaced-1.",)  # fmt: skip
+        assert dict(read_only_document(path).extras) == {"a": 2}
+        kept = path.with_name("document.json.replaced-1")
+        assert dict(read_only_document(kept).extras) == {"theirs": 1}
+
+
 def test_one_file_is_one_document_however_it_is_spelt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "document.json"
     link = tmp_path / "link.json"

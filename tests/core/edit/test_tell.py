@@ -66,6 +66,15 @@ def test_history_and_replay_read_the_journal(tmp_path: Path) -> None:
         replay_lines(path, out)
 
 
+def test_titles_send_nothing_to_the_terminal_but_text(tmp_path: Path) -> None:
+    session = Session.open(tmp_path / "document.json", discover=False)
+    with session.macro("Arr\x1b[2Jange\n> 99 Forged"):
+        session.set_extra("a", 1)
+        session.set_extra("b", 1)
+    assert history_lines(tmp_path / "document.json")[1].endswith("1  Arr?[2Jange?> 99 Forged")
+    session.close(discard=True)
+
+
 def test_a_damaged_journal_is_told(tmp_path: Path) -> None:
     path = tmp_path / "document.json"
     session = Session.open(path, discover=False)
