@@ -20,6 +20,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_geodesic
 from contact_core.job.run import perform
+from contact_core.job.scene import coarse_pose
 from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.slots import PlacementRequest
@@ -117,7 +118,7 @@ def test_the_thumb_search_is_never_worse_than_leaving_the_thumb_open() -> None:
 
 
 def test_pads_land_on_faces_that_face_them_and_the_middle_of_the_axis_comes_there() -> None:
-    ask = request()
+    ask = replace(request(), pose=coarse_pose(job().rig, job().recipe.coarse))
     result = FromPose().place(ask)
     assert result.pose is not None and not result.left_out
     hand = HandPose(replace(ask, pose=result.pose))

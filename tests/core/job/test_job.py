@@ -64,6 +64,17 @@ def test_the_demo_keeps_grasp() -> None:
     assert len(job.solids) == 2
 
 
+@pytest.mark.parametrize("name", ["mug", "pole"])
+def test_the_thumb_opposes_the_fingers(name: str) -> None:
+    """What makes a grip a grip: the surface under the thumb looks the other way than under the other contacts."""
+    job = demo(name)
+    pairs = {pair.pair.name: pair.object_points for pair in job.session.pairs()}
+    normals = {name: points.normals(job.object.mesh).mean(axis=0) for name, points in pairs.items()}
+    thumb = normals.pop("thumb_distal")
+    others = np.mean(list(normals.values()), axis=0)
+    assert thumb @ others < -0.5 * np.linalg.norm(thumb) * np.linalg.norm(others)
+
+
 def test_the_bad_demo_names_what_failed() -> None:
     verdict = demo("bad").verdict
     assert verdict.failed_patches and any("penetration" in failure for failure in verdict.failures)
