@@ -9,6 +9,7 @@ frame None is the scene as it stands, without a key. Refusals are sentences (`co
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -19,7 +20,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.document.schema import VERSION
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.plugins.slots import Picture
 from contact_core.pose.rig import Pose
@@ -237,6 +238,12 @@ def check_overwrite(stored: StoredDocument | None) -> None:
             f"the scene holds a document of schema version {stored.schema}, but this release writes version"
             f" {VERSION}: install a newer contact-core. What is stored was left untouched."
         )
+
+
+def check_frame(frame: float | None) -> None:
+    """What everything with a frame asks first. Raises InvalidInput for infinity, and NaN, which to USD is no frame."""
+    if frame is not None and not math.isfinite(frame):
+        raise InvalidInput(f"a frame is a number, or None for the scene as it stands, but {frame} came.")
 
 
 def capabilities(host: HostAdapter) -> tuple[str, ...]:

@@ -34,6 +34,7 @@ from contact_core.host import (
     SelectionReading,
     StoredDocument,
     Undo,
+    check_frame,
     check_overwrite,
 )
 from contact_core.memory_scene import MemoryObject, MemoryScene, Polygons, load_scene, save_scene
@@ -99,6 +100,7 @@ class MemoryHost(
         return self.read_rig(object_id)
 
     def placement(self, object_id: str, frame: float | None = None) -> FloatArray:
+        check_frame(frame)
         return _placement(self._object(object_id)).world_from_surface
 
     def add(self, asset: Asset, world_from_surface: Any = None) -> str:
@@ -149,6 +151,7 @@ class MemoryHost(
         )
 
     def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
+        check_frame(frame)
         item = self._object(object_id)
         return stretch_pose(item.pose_at(frame), _placement(item).surface_from_local)
 
@@ -160,6 +163,7 @@ class MemoryHost(
         return _placement(item).surface_points(skin(item.rig, world))
 
     def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+        check_frame(frame)
         item = self._object(object_id)
         local = unstretch_pose(pose, _placement(item).surface_from_local)
         self._put("Pose", object_id, item.with_pose(local, frame))

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
+from contact_core.arrays import FloatArray, frozen
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
@@ -59,13 +59,14 @@ def surface_of_polygons(
 def fit_to_scene(asset: Asset, space: SceneSpace, world_from_surface: Any = None) -> FloatArray:
     """(4, 4) world_from_local that puts an asset into a scene: its units scaled to the scene's.
 
-    world_from_surface: where to; None: at the origin, with the asset's up axis turned to the scene's.
+    world_from_surface: where to; None: at the origin, with the asset's up axis turned to the scene's. Raises
+    InvalidInput where it is no matrix of numbers.
     """
     scale = 1.0 if asset.meters_per_unit is None else asset.meters_per_unit / space.meters_per_unit
     if world_from_surface is None:
         world = turn_up(asset.up_axis, space.up_axis)
     else:
-        world = np.array(world_from_surface, dtype=np.float64)
+        world = np.array(frozen(world_from_surface, np.float64, (4, 4), "world_from_surface"))
     world[:3, :3] *= scale
     return world
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from contact_core.document.asset import Asset
+from contact_core.errors import InvalidInput
 from contact_core.memory_host import MemoryHost
+from contact_core.pose.rig import Pose
 from contact_core.testing.host_contract import Build, HostContract
-from contact_core.testing.host_scenes import HostScene
+from contact_core.testing.host_scenes import HostScene, arm_rig
 
 
 def build_in_memory(scene: HostScene, host_type: type[MemoryHost] = MemoryHost) -> MemoryHost:
@@ -39,3 +41,20 @@ class TestMemoryHost(HostContract):
         farther = host.placement("plain").copy()
         farther[0, 3] += 1.0
         host.move("plain", farther)
+
+
+def test_frames_and_places_that_are_no_numbers_are_refused() -> None:
+    host = MemoryHost()
+    rig = arm_rig()
+    key = host.add(Asset("arm", rig.surface, rig))
+    for frame in (np.nan, np.inf, -np.inf):
+        for call in (
+            host.placement,
+            host.read_pose,
+            lambda key, frame: host.write_pose(key, Pose.rest(rig), frame),
+        ):
+            with pytest.raises(InvalidInput, match="a frame is a number"):
+                call(key, frame)
+    with pytest.raises(InvalidInput, match="world_from_surface must be finite"):
+        host.add(Asset("arm", rig.surface), np.full((4, 4), np.nan))
+    assert host.pose_keys(key) == () and len(host.objects()) == 1

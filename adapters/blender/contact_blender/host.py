@@ -34,6 +34,7 @@ from contact_core.host import (
     SelectionReading,
     StoredDocument,
     Undo,
+    check_frame,
 )
 from contact_core.plugins.slots import Picture
 from contact_core.pose.rig import Pose
@@ -110,6 +111,7 @@ class BlenderHost(
         return replace(asset, source_vertices=sources)
 
     def placement(self, object_id: str, frame: float | None = None) -> FloatArray:
+        check_frame(frame)
         scene_object = self._mesh_object(object_id)
         frame_holder = rigs.armature_of(scene_object) or scene_object
         return self._placement(frame_holder, frame).world_from_surface
@@ -144,6 +146,7 @@ class BlenderHost(
         )
 
     def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
+        check_frame(frame)
         _, armature, placement = self._rigged(object_id)
         pose = poses.read_pose(armature, frame, self._known_rig(object_id).unmoved)
         return stretch_pose(pose, placement.surface_from_local)
@@ -158,6 +161,7 @@ class BlenderHost(
         return placement.surface_points(points[kept])
 
     def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+        check_frame(frame)
         _, armature, placement = self._rigged(object_id)
         if armature.library is not None:
             raise InvalidInput(

@@ -25,6 +25,7 @@ from contact_core.host import (
     SelectionReading,
     StoredDocument,
     Undo,
+    check_frame,
     check_overwrite,
 )
 from contact_core.pose.rig import Pose
@@ -109,6 +110,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         return mesh.read_surface(self._mesh(object_id), self.space())
 
     def placement(self, object_id: str, frame: float | None = None) -> FloatArray:
+        check_frame(frame)
         prim = self._prim(object_id)
         return mesh.placement_of(prim, frame).world_from_surface
 
@@ -130,6 +132,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         return asset
 
     def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
+        check_frame(frame)
         cache, binding = self._rig(object_id)
         skeleton = binding.GetSkeleton()
         rest = skel.rest_local(cache, skeleton)
@@ -148,6 +151,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         return placement.surface_points(skel.skin_of_stage(cache, binding, parts, Usd.TimeCode.Default()))
 
     def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
+        check_frame(frame)
         local = self._whole_pose(object_id, pose, frame)
         cache, binding = self._rig(object_id)
         with self.step("Pose"), self._editing():

@@ -162,6 +162,17 @@ def test_a_pose_that_no_channel_can_hold_changes_nothing(bpy: Any, arm: Any) -> 
     assert blender_scenes.whole_state() == before
 
 
+@pytest.mark.parametrize("frame", [np.nan, np.inf, -np.inf])
+def test_frames_that_are_no_numbers_are_refused(bpy: Any, arm: Any, frame: float) -> None:
+    import blender_scenes
+
+    pose, before = arm.read_pose("arm"), blender_scenes.whole_state()
+    for call in (arm.placement, arm.read_pose, lambda key, frame: arm.write_pose(key, pose, frame)):
+        with pytest.raises(InvalidInput, match="a frame is a number"):
+            call("arm", frame)
+    assert blender_scenes.whole_state() == before
+
+
 def test_scale_of_bones_is_kept_and_keyed_when_it_changes(bpy: Any, arm: Any) -> None:
     rig = arm.read_rig("arm").rig
     local = np.array(bent(rig, 1).local)

@@ -172,6 +172,19 @@ quatf[] {damage}
         assert np.isfinite(host.read_pose("/root/bones").local).all()
 
 
+@pytest.mark.parametrize("frame", [np.nan, np.inf, -np.inf])
+def test_frames_that_are_no_numbers_are_refused(frame: float, tmp_path: Path) -> None:
+    """USD takes NaN for its default time, and a key there would be no key at all."""
+    host = UsdHost(written(tmp_path / "good.usda", skinned(JOINTS, SKIN)))
+    pose, before = host.read_pose("/root/bones"), host.layer.ExportToString()
+    for call in (host.placement, host.read_pose, lambda key, frame: host.write_pose(key, pose, frame)):
+        with pytest.raises(InvalidInput, match="a frame is a number"):
+            call("/root/bones", frame)
+    with pytest.raises(InvalidInput, match="world_from_surface must be finite"):
+        host.add(Asset("ball", meshes.icosphere(1)), np.full((4, 4), frame))
+    assert host.layer.ExportToString() == before and not host.undo()
+
+
 def test_selections_of_points_that_are_not_there_are_refused(tmp_path: Path) -> None:
     subset = 'def GeomSubset "part" {\nuniform token elementType = "point"\nint[] indices = [1, 77]\n}\n'
     host = UsdHost(written(tmp_path / "part.usda", f'def Mesh "solid" {{\n{TRIANGLE}{subset}}}\n'))
