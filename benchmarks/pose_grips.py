@@ -24,12 +24,12 @@ from bench_pose import placed
 from best_known import STARTS, keep, kept, search
 from harness import record
 from planted_poses import planted_rows
+from sliding_study import sliding_rows
 
 import contact_builtins
 from contact_builtins.demos import demo_recipe
 from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_core.arrays import FloatArray
-from contact_core.contact.placement import Root
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
@@ -40,8 +40,6 @@ from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
 from contact_core.pose.problem import PoseProblem
 from contact_core.pose.rig import skin
 from contact_core.pose.solver import PoseSolution, SolveOptions, patch_residuals
-from contact_core.proposals.sliding import SlidSolution, solve_sliding
-from contact_core.proposals.sliding_targets import SlidingPatch
 
 HERE = Path(__file__).resolve().parent
 GRIPS = ("baseball", "pole", "mug")  # of benchmarks/grips and of `contact demo`
@@ -70,25 +68,6 @@ class Grip:
         points = skin(self.job.rig, state.motions[0].world) @ into[:3, :3].T + into[:3, 3]
         deepest = max(float(-field.sample(points)[0].min()) for field in self.fields)
         return 100.0 * max(deepest, 0.0) / problem.manipulator_length
-
-    def sliding(self, slack: float, penalty: float) -> list[SlidingPatch]:
-        """Every contact of the grip, free within a slack (shares of the length)."""
-        document, patches = self.job.session.document, []
-        for contact, pair in document.pairs.items():
-            patch = document.patch(pair.object)
-            assert isinstance(patch.placement, Root)
-            patches.append(
-                SlidingPatch(
-                    contact,
-                    document.shapes[patch.shape],
-                    patch.placement,
-                    slack * self.problem.manipulator_length,
-                    penalty=penalty,
-                    mirrored=patch.mirrored,
-                    unit=self.job.session.derived.unit(document, pair.object),
-                )
-            )
-        return patches
 
 
 def gap(solution: PoseSolution) -> float:
@@ -143,31 +122,6 @@ def penetration(grips: Sequence[Grip]) -> list[str]:
         )
     record("Grips: the penetration term (at most 1 % deep, at most 150 ms more)", rows)
     return lines
-
-
-def sliding(grips: Sequence[Grip]) -> list[str]:
-    """Contacts where they were placed, and moving along with the pose."""
-    lines = ["Slack 0.1 of the length, penalty 0.1; from the solved pose.", ""]
-    lines += ["| | distance, fixed | sliding | less, % | deepest, fixed | sliding | seconds |", "|---" * 7 + "|"]
-    return lines + [slides(grip) for grip in grips]
-
-
-def slides(grip: Grip) -> str:
-    fixed = LevenbergMarquardt().solve(grip.problem)
-    slid: list[SlidSolution] = []
-    for _ in range(3):
-        patches = grip.sliding(0.1, 0.1)
-        slid.append(solve_sliding(LevenbergMarquardt(), grip.problem.at(fixed.theta), patches, OPTIONS))
-    seconds = median(s.solution.seconds for s in slid)
-    solution = slid[0].solution
-    return (
-        f"| {grip.name} | {gap(fixed):.2f} | {gap(solution):.2f} | {100 * (1 - gap(solution) / gap(fixed)):.0f} |"
-        f" {grip.depth(fixed.problem, fixed.theta):.2f} | {grip.depth(solution.problem, solution.theta):.2f} |"
-        f" {seconds:.2f} |"
-    )
-
-
-OPTIONS = SolveOptions(max_iterations=40, candidates=("current",))
 
 
 def placements(grips: Sequence[Grip], count: int, starts: int) -> list[str]:
@@ -244,10 +198,11 @@ def main() -> None:
     if unknown:
         parser.error(f"no part is called {', '.join(unknown)}; there are {', '.join(PARTS)}.")
     wanted = given.parts or list(PARTS)
-    grips = [Grip(name) for name in (*GRIPS, *given.examples)] if wanted != ["planted"] else []
+    names = (*GRIPS, *given.examples) if {"penetration", "placements"} & set(wanted) else ()
+    grips = [Grip(name) for name in names]
     measures: dict[str, Callable[[], list[str]]] = {
         "penetration": lambda: penetration(grips),
-        "sliding": lambda: sliding(grips),
+        "sliding": lambda: sliding_rows(assets=bool(given.examples)),
         "placements": lambda: placements(grips, given.placements, given.starts),
         "planted": lambda: planted_rows(given.seeds),
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -253,8 +254,21 @@ def solids_of(problem: PoseProblem, solids: Solids | None, resolution: int = RES
 def thinned(mesh: TriangleMesh, count: int) -> tuple[IntArray, FloatArray]:
     """At most about `count` vertices that stand for the surface, and the area (k,) that each stands for.
 
-    One vertex per cell of a cubic grid, the one with the largest area; the cell's area goes to it.
+    One vertex per cell of a cubic grid, the one with the largest area; the cell's area goes to it. Read-only, and
+    kept with the mesh.
     """
+    kept = _thinned.setdefault(mesh, {})
+    if count not in kept:
+        kept[count] = _thin(mesh, count)
+        for array in kept[count]:
+            array.setflags(write=False)
+    return kept[count]
+
+
+_thinned: WeakKeyDictionary[TriangleMesh, dict[int, tuple[IntArray, FloatArray]]] = WeakKeyDictionary()
+
+
+def _thin(mesh: TriangleMesh, count: int) -> tuple[IntArray, FloatArray]:
     areas: FloatArray = np.zeros(len(mesh.points))
     np.add.at(areas, mesh.faces, mesh.face_areas[:, None] / 3.0)
     used: IntArray = np.flatnonzero(areas > 0.0)

@@ -60,9 +60,10 @@ def test_the_examples(assets: Path, repository: Path, example: str, less: float)
     promised(load_recipe(repository / "examples" / f"{example}.toml"), less)
 
 
-@pytest.mark.parametrize("demo", ["baseball", "pole"])
+@pytest.mark.parametrize("demo", ["baseball", "pole", "mug"])
 def test_the_demos(demo: str) -> None:
-    promised(demo_recipe(demo), 0.1)
+    """However well their contacts fit as they are."""
+    promised(demo_recipe(demo), 0.0)
 
 
 class TestNoDeeper(TermContract):
