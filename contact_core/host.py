@@ -241,7 +241,7 @@ def check_overwrite(stored: StoredDocument | None) -> None:
 
 
 def check_frame(frame: float | None) -> None:
-    """What everything with a frame asks first. Raises InvalidInput for infinity, and NaN, which to USD is no frame."""
+    """What everything with a frame asks first. Raises InvalidInput for infinity, and for NaN, no frame to USD."""
     if frame is not None and not math.isfinite(frame):
         raise InvalidInput(f"a frame is a number, or None for the scene as it stands, but {frame} came.")
 
