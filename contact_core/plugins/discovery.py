@@ -34,7 +34,8 @@ class Candidate:
 def discovered(environ: Mapping[str, str] | None = None) -> list[Candidate]:
     """Every plugin to be tried, lowest precedence first. CONTACT_PLUGINS is a list of module names, parted by
     commas; "no:NAME" in it leaves out the plugin of that name."""
-    words = [word.strip() for word in (environ or os.environ).get(VARIABLE, "").split(",")]
+    variables = os.environ if environ is None else environ
+    words = [word.strip() for word in variables.get(VARIABLE, "").split(",")]
     left_out = {word.removeprefix("no:") for word in words if word.startswith("no:")}
     named = [word for word in words if word and not word.startswith("no:")]
     found = [*_from_entry_points(), *(_from_variable(word) for word in named)]

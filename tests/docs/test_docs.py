@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -171,6 +172,35 @@ def test_the_site_builds_without_warnings(tmp_path: Path) -> None:
     )  # fmt: skip
     assert run.returncode == 0 and "WARNING" not in run.stderr, run.stderr[-3000:]
     assert (tmp_path / "site" / "index.html").exists()
+
+
+def required(extra: str | None) -> set[str]:
+    """Names of the distributions that the core (None) or one of its extras asks for."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    listed = project["dependencies"] if extra is None else project["optional-dependencies"][extra]
+    return {re.split(r"[<>=\[ ]", line)[0] for line in listed}
+
+
+def test_every_library_has_its_licence_in_the_table() -> None:
+    rows = re.findall(r"^\| ([^|]+) \| (\w+) \|", (ROOT / "docs" / "licences.md").read_text(encoding="utf-8"), re.M)
+    told = {
+        extra: {name.strip().lower() for cell, of in rows if of == extra for name in cell.split(",")}
+        for _, extra in rows
+    }
+    for extra in ("io", "solvers", "samples", "viewer", "usd", "blender", "engines", "testing"):
+        assert required(extra) <= told[extra], extra
+    assert required(None) <= told["core"]
+
+
+def test_the_page_for_studios_names_what_the_core_needs_and_every_variable() -> None:
+    page = (ROOT / "docs" / "studios.md").read_text(encoding="utf-8")
+    (sentence,) = re.findall(r"The core needs ([^.]+)\.", page)
+    assert set(re.split(r", | and ", sentence)) == required(None)
+    sources = [path for folder in ("contact_core", "plugins", "adapters") for path in (ROOT / folder).rglob("*.py")]
+    used = {
+        word for path in sources for word in re.findall(r"\bCONTACT_[A-Z]+\b", path.read_text(encoding="utf-8"))
+    }
+    assert used - {"CONTACT_API"} == set(re.findall(r"^\| `(CONTACT_\w+)` \|", page, re.MULTILINE))
 
 
 def test_no_committed_file_names_a_registry() -> None:

@@ -281,6 +281,12 @@ def test_the_variable_leaves_plugins_out_and_names_failures() -> None:
     assert record_of(manager, "no_such_module").problems
 
 
+def test_an_environment_that_is_given_stands_for_the_process_s_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CONTACT_PLUGINS", "no_such_module")
+    assert "no_such_module" in {record.name for record in PluginManager().records()}
+    assert "no_such_module" not in {record.name for record in PluginManager(environ={}).records()}
+
+
 def test_without_discovery_only_what_is_given_is_there() -> None:
     manager = PluginManager([plugin(Named("only"))], discover=False)
     assert [record.name for record in manager.records()] == ["given"]
