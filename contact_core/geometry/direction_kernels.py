@@ -13,6 +13,7 @@ from contact_core.geometry.tangent_kernels import (
     PI,
     corner_angle,
     corner_at_angle,
+    norm,
     place,
     turned,
     vertex_scale,
@@ -21,8 +22,10 @@ from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, preceding
 
 
 @kernel
-def in_frame(h: int, dx: float, dy: float, dz: float, points: FloatArray, faces: IntArray) -> tuple[float, float]:
-    """A direction in space projected into the frame of halfedge h (not normalised)."""
+def in_frame(
+    h: int, dx: float, dy: float, dz: float, points: FloatArray, faces: IntArray
+) -> tuple[float, float, float]:
+    """A direction in space in the frame of halfedge h, and along the normal of its face (not normalised)."""
     f, k = h // 3, h % 3
     a, b, c = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
     ex, ey, ez = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
@@ -33,7 +36,11 @@ def in_frame(h: int, dx: float, dy: float, dz: float, points: FloatArray, faces:
     wx, wy, wz = wx - along * ex, wy - along * ey, wz - along * ez
     height = math.sqrt(wx * wx + wy * wy + wz * wz)
     x = dx * ex + dy * ey + dz * ez
-    return x, (dx * wx + dy * wy + dz * wz) / height if height > 0.0 else 0.0
+    if height == 0.0:
+        return x, 0.0, 0.0
+    wx, wy, wz = wx / height, wy / height, wz / height
+    normal = dx * (ey * wz - ez * wy) + dy * (ez * wx - ex * wz) + dz * (ex * wy - ey * wx)
+    return x, dx * wx + dy * wy + dz * wz, normal
 
 
 @kernel
@@ -82,26 +89,28 @@ def headings_of_directions(
         if on == ON_NOTHING:
             return element
         if on == ON_FACE:
-            x, y = in_frame(3 * element, dx, dy, dz, points, faces)
+            x, y, _ = in_frame(3 * element, dx, dy, dz, points, faces)
         elif on == ON_EDGE:
-            x, y = in_frame(element, dx, dy, dz, points, faces)
+            x, y, _ = in_frame(element, dx, dy, dz, points, faces)
             if twin[element] >= 0:
-                _, beyond = in_frame(twin[element], dx, dy, dz, points, faces)
+                _, beyond, _ = in_frame(twin[element], dx, dy, dz, points, faces)
                 y = y if y >= beyond else -beyond
             else:
                 y = max(y, 0.0)
         else:
-            best, angle = -2.0, 0.0
+            least, angle = math.inf, 0.0
             h = first[element]
             while True:
-                x, y = in_frame(h, dx, dy, dz, points, faces)
+                x, y, z = in_frame(h, dx, dy, dz, points, faces)
                 corner = corner_angle(h, shape)
                 half = 0.5 * corner
                 u, v = turned(x, y, math.cos(half), -math.sin(half))
                 alpha = half + min(max(math.atan2(v, u), -half), half)
-                agreement = x * math.cos(alpha) + y * math.sin(alpha)
-                if agreement > best:
-                    best, angle = agreement, shape[h, 3] + alpha
+                # measured by what is missed: a cosine would not tell directions 1e-9 apart
+                along, across = turned(x, y, math.cos(alpha), -math.sin(alpha))
+                miss = norm(across, z) if along > 0.0 else norm(norm(across, z), along) - along
+                if miss < least:
+                    least, angle = miss, shape[h, 3] + alpha
                 h = twin[preceding(h)]
                 if h < 0 or h == first[element]:
                     break

@@ -50,8 +50,12 @@ def place(
     for k in range(3):
         if b2 * shape[h + k, 2] <= near:  # b0, b1, b2 are the weights at tail, head and apex of this side
             x = b1 * shape[h + k, 0] + b2 * shape[h + k, 1]
-            if -near <= x <= shape[h + k, 0] + near:
-                return on_edge(h + k, min(max(x, 0.0), shape[h + k, 0]), twin, shape)
+            if -near <= x <= near:
+                return ON_VERTEX, tail[h + k], 0.0, 0.0
+            if abs(x - shape[h + k, 0]) <= near:
+                return ON_VERTEX, tail[following(h + k)], 0.0, 0.0
+            if 0.0 < x < shape[h + k, 0]:
+                return on_edge(h + k, x, twin, shape)
         b0, b1, b2 = b1, b2, b0
     return ON_FACE, f, b1 * l0 + b2 * shape[h, 1], b2 * shape[h, 2]
 

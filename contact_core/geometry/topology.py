@@ -14,6 +14,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput, NotManifold
+from contact_core.geometry.flat_faces import mollify
 from contact_core.geometry.mesh import TriangleMesh
 
 BOUNDARY: Final = -1  # a twin: no face on the other side
@@ -56,11 +57,12 @@ class Topology:
     @classmethod
     def _build(cls, mesh: TriangleMesh) -> Topology:
         from contact_core.geometry import topology_kernels as kernels
+        from contact_core.geometry.tangent_kernels import EXCESS
 
         n, count = len(mesh.points), 3 * len(mesh.faces)
         shape = np.zeros((count, 4))
         tail = mesh.faces.ravel()
-        lengthless = kernels.measure(mesh.points, mesh.faces, shape)
+        lengthless, flat = kernels.measure(mesh.points, mesh.faces, shape)
         if lengthless:
             tail = np.empty(count, np.int64)
             kernels.merge_lengthless_edges(mesh.faces, shape, np.arange(n), tail)
@@ -72,6 +74,10 @@ class Topology:
         angle_sum = np.zeros(n)
         kind = np.full(n, UNUSED_VERTEX, np.int64)
         kernels.order_fans(tail, twin, shape, degree, first, angle_sum, kind)
+        if flat:
+            straight = np.where(kind == BOUNDARY_VERTEX, np.pi, 2.0 * np.pi)
+            if mollify(twin, shape, (angle_sum > straight + EXCESS)[tail]):
+                kernels.order_fans(tail, twin, shape, degree, first, angle_sum, kind)
         for array in (twin, shape, first, angle_sum, kind):
             array.setflags(write=False)
         return cls(tail, twin, shape, first, angle_sum, kind)

@@ -6,6 +6,7 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry import topology
+from contact_core.geometry.flat_faces import FLAT
 from contact_core.geometry.jit import constant, inlined, kernel
 
 BOUNDARY = constant(topology.BOUNDARY)
@@ -28,12 +29,13 @@ def preceding(h: int) -> int:
 
 
 @kernel
-def measure(points: FloatArray, faces: IntArray, shape: FloatArray) -> int:
-    """Write length and apex of every halfedge into shape (3m, 4); returns how many have no length.
+def measure(points: FloatArray, faces: IntArray, shape: FloatArray) -> tuple[int, int]:
+    """Write length and apex of every halfedge into shape (3m, 4); returns how many have no length, and how many lie
+    along a flat face.
 
     A length is bitwise the same from both sides of an edge: squares do not see the sign of a difference.
     """
-    lengthless = 0
+    lengthless, flat = 0, 0
     for f in range(len(faces)):
         for k in range(3):
             a, b, c = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
@@ -48,7 +50,9 @@ def measure(points: FloatArray, faces: IntArray, shape: FloatArray) -> int:
             cx, cy, cz = ey * wz - ez * wy, ez * wx - ex * wz, ex * wy - ey * wx
             record[1] = (ex * wx + ey * wy + ez * wz) / length
             record[2] = math.sqrt(cx * cx + cy * cy + cz * cz) / length
-    return lengthless
+            if record[2] <= FLAT * length:
+                flat += 1
+    return lengthless, flat
 
 
 @kernel

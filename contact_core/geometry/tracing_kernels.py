@@ -23,6 +23,7 @@ from contact_core.geometry.tangent_kernels import (
     corner_at_angle,
     direction_of_next,
     heading_at,
+    norm,
     place,
     turned,
     turned_back,
@@ -44,8 +45,11 @@ TOO_LONG = constant(3)  # more than MOST_CROSSINGS: a length that no one meant
 NO_ROOM = constant(4)  # the polyline buffer is full
 MET_BEND = constant(5)  # a walk that was to stop there met a vertex that bends paths
 MOST_CROSSINGS = constant(5_000_000)
-MEETING = 4.0 * SNAP
-GRAZE = 1e-12  # radians by which a direction may point out of a boundary and still run along it
+MEETING = 4.0 * SNAP  # the wider sense in which a walk meets vertices that it is to stop at
+GRAZE = 1e-10  # radians by which a direction may point out of a boundary and still run along it
+# Legs of a chain join at vertices. A leg that ends this near to one, as a part of an edge, ends there: vertices on
+# its way that are not quite flat (EXCESS) may have turned it a little.
+JOINT = 1e-9
 
 
 @inlined
@@ -121,6 +125,7 @@ def walk(
     y: float,
     zx: float,
     zy: float,
+    to_joint: bool,
     to_bend: bool,
     tail: IntArray,
     twin: IntArray,
@@ -137,12 +142,14 @@ def walk(
     Crossings are appended to the line buffers from row line_end on, if these have rows. Returns (status; the
     halfedge in whose frame the walk ends, or the blocked element, or -1 if it could not leave its start; x, y;
     direction x, y; remaining length; line_end).
+    to_joint: another leg follows, so the walk ends at a vertex that it meets with hardly anything (JOINT) to go.
     to_bend: stop at the first vertex that bends paths, met in a wider sense, so that no walk the other way meets
-    one more. Returns MET_BEND, the corner there and the direction back in its frame.
+    one more. Returns MET_BEND, the corner there, how far to the left the vertex lay, 0, and the direction back in
+    the frame of the corner.
     """
     remaining = math.hypot(zx, zy)
     dx, dy = zx / remaining, zy / remaining
-    h, vertex, angle = -1, -1, 0.0
+    h, vertex, angle, miss = -1, -1, 0.0, 0.0
     if on == ON_FACE:
         h, x, y, dx, dy = start_in_face(element, x, y, dx, dy, shape)
     elif on == ON_EDGE:
@@ -186,14 +193,15 @@ def walk(
             inverse = 1.0 / across
             step = max(((ox - x) * uy + y * ux) * inverse, 0.0)
             along = min(max(((ox - x) * dy + y * dx) * inverse, 0.0), size)  # from the tail or head to the apex
-        if remaining <= step + near:
+        at_vertex = along <= near or size - along <= near
+        if at_vertex:  # the way to the vertex, not to where the ray leaves beside it
+            along = 0.0 if along <= near else size
+            vx, vy = ox + along * ux - x, along * uy - y
+            step, miss = max(vx * dx + vy * dy, 0.0), vy * dx - vx * dy
+        if remaining <= step + (JOINT * size if to_joint and at_vertex else near):
             step = min(step, remaining)
             return DONE, h, x + step * dx, y + step * dy, dx, dy, 0.0, line_end
         remaining -= step
-        if along <= near:
-            along = 0.0
-        elif size - along <= near:
-            along = size
         if len(line_faces) > 0:
             if line_end >= len(line_faces):
                 return NO_ROOM, h, x, y, dx, dy, remaining, line_end
@@ -201,7 +209,7 @@ def walk(
             record(h, 1.0 - t if right else 0.0, t, line_faces, line_barycentric, line_end)
             line_end += 1
         x, y = ox + along * ux, along * uy
-        if along == 0.0 or along == size:
+        if at_vertex:
             if along == size:
                 corner = preceding(h)
                 bx, by = turned_back(dx, dy, ax / shape[corner, 0], ay / shape[corner, 0])
@@ -213,7 +221,7 @@ def walk(
                 bx, by = -dx, -dy
             vertex = tail[corner]
             if to_bend and bends_paths(vertex, angle_sum, kind):
-                return MET_BEND, corner, x, y, bx, by, remaining, line_end
+                return MET_BEND, corner, miss, 0.0, bx, by, remaining, line_end
             if kind[vertex] == BLOCKED_VERTEX:
                 return MET_BLOCKED_VERTEX, vertex, x, y, dx, dy, remaining, line_end
             angle = onward_angle(vertex, angle_round_vertex(corner, bx, by, shape), angle_sum, kind)
@@ -223,6 +231,8 @@ def walk(
         other = twin[edge]
         if other < 0:
             status = DONE if other == BOUNDARY else MET_BLOCKED_EDGE
+            if to_joint and remaining <= JOINT * size:
+                remaining = 0.0
             return status, h if other == BOUNDARY else edge, x, y, dx, dy, remaining, line_end
         if right:  # the other side runs from the apex to the head
             x, ux, uy = size - along, -ux, -uy
@@ -234,10 +244,39 @@ def walk(
 
 
 @inlined
+def corner_near(h: int, x: float, y: float, part: float, shape: FloatArray) -> int:
+    """The corner, by its halfedge, that (x, y) in the frame of h lies within a part of an edge of; -1 if none."""
+    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    near = part * max(length, shape[following(h), 0])
+    if norm(x, y) <= near:
+        return h
+    if norm(x - length, y) <= near:
+        return following(h)
+    return preceding(h) if norm(x - ax, y - ay) <= near else -1
+
+
+@inlined
+def moved_into_face(h: int, x: float, y: float, shape: FloatArray) -> tuple[float, float]:
+    """(x, y) in the frame of h, or the nearest point of the edge that rounding put it beyond. (To clip barycentric
+    coordinates instead would move it a million times as far, near the corner of a sliver.)"""
+    length, left_length, right_length = shape[h, 0], shape[preceding(h), 0], shape[following(h), 0]
+    ux, uy = shape[h, 1] / left_length, shape[h, 2] / left_length
+    if ux * y - uy * x > 0.0:
+        t = min(max(x * ux + y * uy, 0.0), left_length)
+        x, y = t * ux, t * uy
+    ux, uy = direction_of_next(h, shape)
+    if ux * y - uy * (x - length) < 0.0:
+        t = min(max((x - length) * ux + y * uy, 0.0), right_length)
+        x, y = length + t * ux, t * uy
+    return x, max(y, 0.0)
+
+
+@inlined
 def settle(
     h: int,
     x: float,
     y: float,
+    is_joint: bool,
     tail: IntArray,
     twin: IntArray,
     shape: FloatArray,
@@ -248,11 +287,16 @@ def settle(
     """Write (x, y) in the frame of h as surface point i and return its place; what lies on an edge or a vertex is
     written with exact zeros, so that whoever reads the point finds the same place."""
     length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
-    apex = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
-    head = min(max((x - apex * ax) / length, 0.0), 1.0 - apex)
-    record(h, head, apex, faces, barycentric, i)
-    f = h // 3
-    on, element, px, py = place(f, barycentric[i, 0], barycentric[i, 1], barycentric[i, 2], tail, twin, shape)
+    f, corner = h // 3, corner_near(h, x, y, JOINT if is_joint else SNAP, shape)
+    if corner >= 0:
+        on, element, px, py = ON_VERTEX, tail[corner], 0.0, 0.0
+        faces[i] = f
+    else:
+        x, y = moved_into_face(h, x, y, shape)
+        apex = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
+        head = min(max((x - apex * ax) / length, 0.0), 1.0 - apex)
+        record(h, head, apex, faces, barycentric, i)
+        on, element, px, py = place(f, barycentric[i, 0], barycentric[i, 1], barycentric[i, 2], tail, twin, shape)
     if on == ON_VERTEX:
         for k in range(3):
             barycentric[i, k] = 1.0 if tail[3 * f + k] == element else 0.0
@@ -315,13 +359,15 @@ def trace(
         while True:
             if rest >= 1e-290:
                 status, h, x, y, dx, dy, rest, cursor = walk(
-                    on, element, x, y, hx * rest, hy * rest, False, tail, twin, shape, first, angle_sum, kind,
-                    line_faces, line_barycentric, cursor,
+                    on, element, x, y, hx * rest, hy * rest, leg < offsets[i + 1], False,
+                    tail, twin, shape, first, angle_sum, kind, line_faces, line_barycentric, cursor,
                 )  # fmt: skip
                 if status != DONE:
                     return status, i, h
                 if h >= 0:
-                    on, element, x, y = settle(h, x, y, tail, twin, shape, faces, barycentric, i)
+                    on, element, x, y = settle(
+                        h, x, y, leg < offsets[i + 1], tail, twin, shape, faces, barycentric, i
+                    )
                     hx, hy = heading_at(on, element, h, dx, dy, tail, twin, shape, angle_sum, kind)
             if rest > 0.0 or leg == offsets[i + 1]:
                 break

@@ -53,8 +53,8 @@ def bend_met(
 ) -> tuple[int, int, float, float]:  # fmt: skip
     """The last vertex that bends paths on the last leg of a way, walked back from its end along the unit vector
     (bx, by): (vertex or -1, corner, leg from the vertex to the end in the corner's frame)."""
-    status, corner, _, _, x, y, before, _ = walk(
-        on, element, x, y, length * bx, length * by, True, tail, twin, shape, first, angle_sum, kind,
+    status, corner, miss, _, cos, sin, before, _ = walk(
+        on, element, x, y, length * bx, length * by, False, True, tail, twin, shape, first, angle_sum, kind,
         no_faces, no_barycentric, 0,
     )  # fmt: skip
     if status != MET_BEND:
@@ -63,7 +63,7 @@ def bend_met(
     to_v = distance_at(v, epoch, reach)
     if to_v >= distance or to_v + after > distance * AS_LONG:
         return -1, 0, 0.0, 0.0
-    return v, corner, after * x, after * y
+    return v, corner, after * cos - miss * sin, after * sin + miss * cos
 
 
 @kernel
