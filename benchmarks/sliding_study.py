@@ -25,7 +25,7 @@ from contact_core.proposals.proposal import ProposalSettings, slide
 
 HERE = Path(__file__).resolve().parent
 FOLDERS = (HERE.parent / "examples", HERE / "grips")
-BUILT_IN = ("07_mug_slide", "baseball", "pole")
+BUILT_IN = ("07_mug_slide", "baseball", "pole", "demo mug")
 WITH_ASSETS = ("04_bunny", "03_cup_body", "01_ball_fingertips")  # which this repository does not hold
 PLUGINS = PluginManager([contact_builtins], discover=False)
 TIMED = 5  # slides of each grip
@@ -47,7 +47,7 @@ def sliding_rows(assets: bool) -> list[str]:
     rows = {}
     for name in (*BUILT_IN, *WITH_ASSETS * assets):
         files = [file for file in (folder / f"{name}.toml" for folder in FOLDERS) if file.exists()]
-        recipe = load_recipe(files[0]) if files else demo_recipe(name)
+        recipe = load_recipe(files[0]) if files else demo_recipe(name.removeprefix("demo "))
         job, before = _performed(recipe, 0.0)
         after = _performed(recipe, SLACK)[1]
         processor, clock = _times(job)
