@@ -29,8 +29,10 @@ def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], nam
         array = np.zeros(tuple(extent or 0 for extent in shape))
     if array.dtype.kind not in "biufc":
         raise InvalidInput(f"{name} must be an array of numbers of shape {_spell(shape)}; got {array.dtype}.")
-    wants_whole = np.issubdtype(np.dtype(dtype), np.integer) and array.dtype.kind in "fc"
-    if wants_whole and not (np.isfinite(array).all() and np.array_equal(array, np.trunc(array.real))):
+    if array.dtype.kind == "c" and not np.issubdtype(np.dtype(dtype), np.complexfloating):
+        raise InvalidInput(f"{name} must hold real numbers, but holds complex ones ({array.dtype}).")
+    wants_whole = np.issubdtype(np.dtype(dtype), np.integer) and array.dtype.kind == "f"
+    if wants_whole and not (np.isfinite(array).all() and np.array_equal(array, np.trunc(array))):
         raise InvalidInput(f"{name} must hold whole numbers, but holds fractions or NaN ({array.dtype}).")
     fits = array.ndim == len(shape) and all(
         want is None or want == got for want, got in zip(shape, array.shape, strict=True)

@@ -92,11 +92,11 @@ def log_map(
     from contact_core.geometry.way_kernels import read_chains, read_targets
 
     limit = _limit(max_distance)
-    if not len(sources):
-        raise InvalidInput("a log map needs at least one source, but none came.")
     topology = Topology.of(mesh)
     require_on_surface(topology, sources, "sources")
     require_on_surface(topology, targets, "targets")
+    if not len(sources):
+        raise InvalidInput("a log map needs at least one source, but none came.")
     count = len(targets)
     anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
     distance, headings = np.empty(count), np.empty(count, np.complex128)
@@ -171,7 +171,10 @@ _NO_BARYCENTRIC: FloatArray = np.empty((0, 3))
 def _limit(max_distance: float | None) -> float:
     if max_distance is None:
         return float("inf")
-    limit = float(max_distance)
+    try:
+        limit = float(max_distance)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"max_distance must be a length of at least 0, but is {max_distance!r}.") from error
     if not limit >= 0.0:
         raise InvalidInput(f"max_distance must be a length of at least 0, but is {max_distance}.")
     return limit

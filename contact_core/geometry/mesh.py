@@ -10,6 +10,8 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray, digest, frozen
 from contact_core.errors import InvalidInput
 
+_LARGEST = 1e60  # coordinate: products of four lengths neither overflow nor vanish
+
 
 class TriangleMesh:
     """An immutable triangle mesh.
@@ -23,6 +25,12 @@ class TriangleMesh:
     def __init__(self, points: Any, faces: Any) -> None:
         self.points: FloatArray = frozen(points, np.float64, (None, 3), "points")
         self.faces: IntArray = frozen(faces, np.int64, (None, 3), "faces")
+        size = float(np.abs(self.points).max(initial=0.0))
+        if size and not 1.0 / _LARGEST <= size <= _LARGEST:
+            raise InvalidInput(
+                f"the largest coordinate of points must lie from {1.0 / _LARGEST:g} to {_LARGEST:g}, but is"
+                f" {size:.3g}; use another unit."
+            )
         if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= len(self.points)):
             bad = int(np.argmax(((self.faces < 0) | (self.faces >= len(self.points))).any(axis=1)))
             raise InvalidInput(

@@ -75,6 +75,8 @@ def trace_chains(
     """
     from contact_core.geometry.tracing_kernels import NO_ROOM, trace
 
+    topology = Topology.of(mesh)
+    require_on_surface(topology, starts, "starts")
     count = len(starts)
     first_leg = _complex_vectors(first_leg, count)
     turning_angles, lengths = _numbers(turning_angles), _numbers(lengths)
@@ -84,8 +86,6 @@ def trace_chains(
         raise InvalidInput(
             f"a chain has one turning angle for each length, but {len(turning_angles)} and {len(lengths)} came."
         )
-    topology = Topology.of(mesh)
-    require_on_surface(topology, starts, "starts")
     faces, barycentric = np.empty(count, np.int64), np.empty((count, 3))
     headings, remaining = np.empty(count, np.complex128), np.empty(count)
     order = np.argsort(starts.faces, kind="stable") if count >= _WORTH_SORTING else np.arange(count)
@@ -119,7 +119,9 @@ _NO_NUMBERS: FloatArray = np.zeros(0)
 
 
 def require_on_surface(topology: Topology, points: SurfacePoints, name: str) -> None:
-    """Raise InvalidInput if points name faces that the mesh does not have, or that have no three corners."""
+    """Raise InvalidInput if points are none, or name faces that the mesh does not have."""
+    if not isinstance(points, SurfacePoints):
+        raise InvalidInput(f"{name} must be SurfacePoints(faces, barycentric), but {type(points).__name__} came.")
     m = len(topology.tail) // 3
     if len(points.faces) and (points.faces.min() < 0 or points.faces.max() >= m):
         bad = int(np.argmax((points.faces < 0) | (points.faces >= m)))
@@ -127,7 +129,10 @@ def require_on_surface(topology: Topology, points: SurfacePoints, name: str) -> 
 
 
 def _complex_vectors(values: Any, count: int) -> ComplexArray:
-    array = np.ascontiguousarray(values, dtype=np.complex128)
+    try:
+        array = np.atleast_1d(np.asarray(values))
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"vectors must be complex numbers, one for each start; got {error}.") from error
     if array.shape != (count,):
         raise InvalidInput(f"vectors must have shape ({count},), one for each start, but have {array.shape}.")
     return frozen(array, np.complex128, (count,), "vectors")
