@@ -39,6 +39,8 @@ except ImportError as error:
 from contact_usd import export, mesh, poses, registration, skel, stage_io, storage
 from contact_usd.layer import LayerUndo
 
+registration.register()
+
 Binding = tuple[UsdSkel.Cache, UsdSkel.Binding]
 
 
@@ -58,7 +60,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         space: SceneSpace | None = None,
         owned: stage_io.OwnedStage | None = None,
     ) -> None:
-        self.schema_problem = registration.register()
+        self.schema_problem = registration.problem()
         if owned is None and path is not None:
             owned = stage_io.open_stage(Path(path))
         self._owned = owned or stage_io.new_stage(space or SceneSpace(1.0, "Y"))

@@ -15,10 +15,14 @@ from contact_usd.schema_dir import ENVIRONMENT_VARIABLE, schema_dir
 SCHEMAS = ("ContactDocumentAPI", "ContactPatchAPI", "ContactPairAPI")
 
 
-@lru_cache(maxsize=1)
-def register() -> str | None:
-    """Register the schema; None when USD knows it now, else a sentence with the reason and the cure."""
+def register() -> None:
+    """Tell USD where the schema is: at import, for a stage that is opened in between would make it too late."""
     Plug.Registry().RegisterPlugins(str(schema_dir()))
+
+
+@lru_cache(maxsize=1)
+def problem() -> str | None:
+    """None when USD knows the schema, else a sentence with the reason and the cure."""
     registry = Usd.SchemaRegistry()
     if all(registry.FindAppliedAPIPrimDefinition(name) for name in SCHEMAS):
         return None

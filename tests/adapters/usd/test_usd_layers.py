@@ -115,7 +115,9 @@ def test_usds_own_validators_find_no_error_in_our_layer(tmp_path: Path) -> None:
 NEW_PROCESS = """
 import json, sys
 from pxr import Usd, UsdGeom
-early = Usd.Stage.Open(sys.argv[1]) if sys.argv[2] == "late" else None
+if sys.argv[2] == "imported":
+    import contact_usd.host
+early = Usd.Stage.Open(sys.argv[1]) if sys.argv[2] in ("late", "imported") else None
 if sys.argv[2] != "without":
     from contact_usd.host import UsdHost
     host = UsdHost(sys.argv[1])
@@ -132,7 +134,7 @@ print(json.dumps({
 """
 
 
-@pytest.mark.parametrize("plugin", ["with", "without", "late", "environment"])
+@pytest.mark.parametrize("plugin", ["with", "without", "late", "imported", "environment"])
 def test_a_new_process_reads_it_with_and_without_the_schema(plugin: str, tmp_path: Path) -> None:
     host, session, key = torus_host()
     contacts.publish(host, session, {"torus": key})
@@ -147,7 +149,7 @@ def test_a_new_process_reads_it_with_and_without_the_schema(plugin: str, tmp_pat
     seen = json.loads(run.stdout.splitlines()[-1])
     assert seen["points"] == seen["faces"] == 30 and seen["surface"] == key
     assert seen["revision"] == session.revision
-    assert seen["known"] == (["ContactPatchAPI"] if plugin in ("with", "environment") else [])
+    assert seen["known"] == ([] if plugin in ("without", "late") else ["ContactPatchAPI"])
     if plugin == "late":
         assert "PXR_PLUGINPATH_NAME" in seen["problem"] and str(schema_dir()) in seen["problem"]
     else:
