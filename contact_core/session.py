@@ -126,7 +126,8 @@ class Session(PluginVerbs, ProposalVerbs):
             else:
                 before, self._file = self._file, OpenDocument.create(target, self.history)
                 if before is not None:
-                    _close_quietly(before)
+                    with _warned():
+                        before.close(in_order=True)
             self.history.mark_clean()
         return target
 
@@ -233,9 +234,8 @@ class Session(PluginVerbs, ProposalVerbs):
 
     def _record_move(self, origin: str) -> None:
         """Tell host and journal where the history went, the host only when it was not the one who asked."""
-        host_asked = origin == "host"
         title = f"Go to revision {self.revision}"
-        with contextlib.nullcontext() if host_asked else self._in_host(title, self.history.document, self.revision):
+        with _warned() if origin == "host" else self._in_host(title, self.history.document, self.revision):
             if self._file is not None:
                 self._file.went(self.revision)
 
@@ -245,7 +245,8 @@ class Session(PluginVerbs, ProposalVerbs):
             self._abandon()
             before, self.history = self.history.document, history
             if self._file is not None:
-                self._file.restart(history)
+                with _warned():
+                    self._file.restart(history)
             self._announcer.tell(DocumentChanged("goto", before, history.document, history.revision, None, "host"))
 
     @contextlib.contextmanager
@@ -344,9 +345,11 @@ class Session(PluginVerbs, ProposalVerbs):
         self._announcer.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))
 
 
-def _close_quietly(document: OpenDocument) -> None:
-    """Let go of a file whose document lives on elsewhere. A journal that cannot note its end is replayed later."""
+@contextlib.contextmanager
+def _warned() -> Iterator[None]:
+    """What a file refuses is written down and stops nothing: the host went there already, or the document lives on
+    elsewhere."""
     try:
-        document.close(in_order=True)
+        yield
     except FileRefused as error:
-        log.warning("%s was left without an end: %s", document.path, error)
+        log.warning("%s", error)

@@ -150,6 +150,26 @@ def test_a_host_that_undoes_by_itself_during_a_drag_ends_the_drag(known: bool) -
     assert extras(session) == {"c": 1}
 
 
+def test_where_the_host_went_the_session_goes_though_the_journal_cannot(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    host = MemoryHost()
+    session = Session(host=host, discover=False)
+    session.set_extra("a", 1)
+    session.save(tmp_path / "document.json")
+    session._file._journal._broken = "the disk is full."  # type: ignore[union-attr]
+    with pytest.raises(FileRefused, match="disk is full"):
+        session.set_extra("b", 1)
+    stored = host.stored_document()
+    assert stored is not None and stored.revision == session.revision == 1
+    told: list[str] = []
+    session.listen(lambda change: told.append(change.kind))
+    session.undo()
+    assert host.stored_document() is None and extras(session) == {} and told == ["goto"]
+    assert "disk is full" in caplog.text
+    session.close(discard=True)
+
+
 @pytest.mark.parametrize("inside", ["stroke", "macro", "listener"])
 def test_a_second_thread_is_refused_while_the_first_edits(plain: Session, inside: str) -> None:
     answers: list[str] = []
