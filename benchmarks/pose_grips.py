@@ -30,7 +30,7 @@ import contact_builtins
 from contact_builtins.demos import demo_recipe
 from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_core.arrays import FloatArray
-from contact_core.geometry.distance_field import DistanceField
+from contact_core.geometry.inside import depth_inside
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.job.solving import pose_problem
@@ -51,7 +51,7 @@ PLUGINS = PluginManager([contact_builtins], discover=False)
 
 
 class Grip:
-    """One recipe, ready to solve. depth: of the deepest skin point, in % of the length."""
+    """One recipe, ready to solve."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -60,14 +60,14 @@ class Grip:
         recipe = demo_recipe(name) if name in DEMOS else load_recipe(frozen if name in GRIPS else example)
         self.job: Job = prepare(recipe, PLUGINS)
         self.problem = pose_problem(self.job, PLUGINS, self.job.start)
-        self.fields = [DistanceField.of(s, resolution=128) for s in self.job.solids or (self.job.object.mesh,)]
 
     def depth(self, problem: PoseProblem, theta: FloatArray) -> float:
+        """Of the deepest skin vertex in the true solids, in % of the length: no grid comes in between."""
         state = problem.state(theta)
         into = np.linalg.inv(self.job.placed)
         points = skin(self.job.rig, state.motions[0].world) @ into[:3, :3].T + into[:3, 3]
-        deepest = max(float(-field.sample(points)[0].min()) for field in self.fields)
-        return 100.0 * max(deepest, 0.0) / problem.manipulator_length
+        deepest = max(depth_inside(points, solid).max() for solid in self.job.solids or (self.job.object.mesh,))
+        return 100.0 * float(deepest) / problem.manipulator_length
 
 
 def gap(solution: PoseSolution) -> float:
