@@ -7,7 +7,6 @@ import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
-from threading import RLock
 from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.document.document import ContactDocument
@@ -19,6 +18,7 @@ from contact_core.edit.open_document import OpenDocument, real_path
 from contact_core.edit.open_macro import OpenMacro
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
+from contact_core.edit.under_way import UnderWay
 from contact_core.errors import CommandRejected, FileRefused
 from contact_core.plugins.verbs import PluginVerbs
 from contact_core.proposals.verbs import ProposalVerbs
@@ -61,9 +61,7 @@ class Session(PluginVerbs, ProposalVerbs):
         self._announcer = Announcer()
         self._announcer.listen(self._tell_plugins)
         self._file: OpenDocument | None = None
-        self._macro: OpenMacro | None = None
-        self._stroke: Stroke | None = None
-        self._editing = RLock()
+        self._under_way = UnderWay()
         self._equip(plugins, discover=discover)
         if engine is not None:
             self._derived.engine = self.named_engine(engine) if isinstance(engine, str) else engine
@@ -120,7 +118,7 @@ class Session(PluginVerbs, ProposalVerbs):
         target = real_path(Path(path)) if path is not None else self.path
         if target is None:
             raise FileRefused("this document has no file yet: save it with a path.")
-        with self._alone():
+        with self._under_way.alone():
             if self._file is not None and target == self.path and not self.read_only:
                 self._file.save(self.history)
             else:
@@ -154,7 +152,7 @@ class Session(PluginVerbs, ProposalVerbs):
     @property
     def document(self) -> ContactDocument:
         """The document as it is now; within a macro, as the commands so far have made it."""
-        return self._macro.document if self._macro is not None else self.history.document
+        return self._under_way.document or self.history.document
 
     @property
     def derived(self) -> Derived:
@@ -173,10 +171,10 @@ class Session(PluginVerbs, ProposalVerbs):
         steps cannot be joined: use a stroke there. Raises CommandRejected, or FileRefused when it cannot be
         recorded; then nothing has changed.
         """
-        with self._alone():
+        with self._under_way.alone():
             self._check_writable()
-            if self._macro is not None:
-                self._macro.do(command)
+            if self._under_way.macro is not None:
+                self._under_way.macro.do(command)
                 return self.revision
             host_keeps_steps = self._host_link is not None and self._host_link.has_undo
             step = self.history.prepare(command, origin, merge=merge and not host_keeps_steps)
@@ -211,10 +209,11 @@ class Session(PluginVerbs, ProposalVerbs):
         return self._go("goto", revision, origin)
 
     def _go(self, kind: Literal["undo", "redo", "goto"], revision: int = 0, origin: str = "user") -> int:
-        with self._alone():
+        with self._under_way.alone():
             if origin == "host":
-                self._abandon()
-            self._check_idle()
+                self._under_way.abandon()
+            else:
+                self._check_idle()
             before, came_from = self.history.document, self.revision
             step: Step | None = None
             if kind == "goto":
@@ -241,8 +240,8 @@ class Session(PluginVerbs, ProposalVerbs):
 
     def adopt(self, history: History) -> None:
         """Go on with another history: the host brought a document that this one does not know."""
-        with self._alone():
-            self._abandon()
+        with self._under_way.alone():
+            self._under_way.abandon()
             before, self.history = self.history.document, history
             if self._file is not None:
                 with _warned():
@@ -253,17 +252,17 @@ class Session(PluginVerbs, ProposalVerbs):
     def macro(self, title: str) -> Iterator[Session]:
         """Everything done inside is one undo step; an exception takes all of it back. A macro within a macro is
         part of it, and an exception takes that part back."""
-        with self._alone():
+        with self._under_way.alone():
             self._check_writable()
-            if self._macro is not None:
-                with self._macro.part():
+            if self._under_way.macro is not None:
+                with self._under_way.macro.part():
                     yield self
                 return
-            macro = self._macro = OpenMacro(title, self.history.document)
+            macro = self._under_way.macro = OpenMacro(title, self.history.document)
             try:
                 yield self
             finally:
-                self._macro = None
+                self._under_way.macro = None
             command = macro.end()
             if command is not None:
                 self.do(command)
@@ -275,16 +274,16 @@ class Session(PluginVerbs, ProposalVerbs):
         What fails, in the drag or in committing it, leaves the document as it was at the start, and listeners see
         that again.
         """
-        with self._alone():
+        with self._under_way.alone():
             self._check_writable()
             start = self.document
             stroke = Stroke(
                 start, self.revision, self._derived, self.rigs, lambda shown: self._preview(start, shown)
             )
-            self._stroke = stroke
+            self._under_way.stroke = stroke
             try:
                 yield stroke
-                command, self._stroke = stroke.end(), None
+                command, self._under_way.stroke = stroke.end(), None
                 if command is not None:
                     self.do(command)
             except BaseException:
@@ -293,7 +292,7 @@ class Session(PluginVerbs, ProposalVerbs):
                 raise
             finally:
                 stroke.end()
-                self._stroke = None
+                self._under_way.stroke = None
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` after every change and preview, in their order; the returned function stops that."""
@@ -305,36 +304,14 @@ class Session(PluginVerbs, ProposalVerbs):
 
     # -- inside --------------------------------------------------------------------------------------------------
 
-    @contextlib.contextmanager
-    def _alone(self) -> Iterator[None]:
-        """The session to this thread alone. Raises CommandRejected where another is in the middle of an edit."""
-        if not self._editing.acquire(blocking=False):
-            raise CommandRejected("another thread is editing this session: a session is for one thread at a time.")
-        try:
-            yield
-        finally:
-            self._editing.release()
-
     def _check_writable(self) -> None:
         if self._file is not None and self._file.read_only is not None:
             raise CommandRejected(self._file.read_only)
-        if self._stroke is not None:
-            raise CommandRejected("a stroke is under way: end it first.")
+        self._under_way.check_no_stroke()
 
     def _check_idle(self) -> None:
-        """The history may move. Raises CommandRejected."""
         self._check_writable()
-        if self._macro is not None:
-            raise CommandRejected("a macro is under way: undo comes after its end.")
-
-    def _abandon(self) -> None:
-        """The host goes elsewhere in the middle of a stroke or a macro: nothing comes of them."""
-        if self._stroke is not None:
-            self._stroke.abandon()
-            self._stroke = None
-        if self._macro is not None:
-            self._macro.abandon()
-            self._macro = None
+        self._under_way.check_nothing()
 
     def _in_host(self, label: str, document: ContactDocument, revision: int) -> AbstractContextManager[None]:
         if self._host_link is None:

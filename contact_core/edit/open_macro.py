@@ -16,8 +16,8 @@ class OpenMacro:
     def __init__(self, title: str, document: ContactDocument) -> None:
         self.title = title
         self.document = document
+        self.abandoned = False
         self._commands: list[Command] = []
-        self._abandoned = False
 
     def do(self, command: Command) -> None:
         """Do one more command. Raises CommandRejected; then nothing has changed."""
@@ -38,7 +38,7 @@ class OpenMacro:
 
     def abandon(self) -> None:
         """The document that it started from is no longer the current one: nothing will come of it."""
-        self._abandoned = True
+        self.abandoned = True
 
     def end(self) -> Command | None:
         """The command to commit, None where nothing was done. Raises CommandRejected for an abandoned macro."""
@@ -48,7 +48,7 @@ class OpenMacro:
         return Macro(self.title, tuple(self._commands))
 
     def _check(self) -> None:
-        if self._abandoned:
+        if self.abandoned:
             raise CommandRejected(
                 f"the host went to another document during {self.title!r}: nothing of it is done."
             )

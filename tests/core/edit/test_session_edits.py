@@ -144,7 +144,9 @@ def test_a_host_that_undoes_by_itself_during_a_drag_ends_the_drag(known: bool) -
     assert host.redo() and extras(session) == {"a": 1}
     with pytest.raises(CommandRejected, match="host went to another document"), session.macro("Arrange"):
         session.set_extra("b", 1)
-        assert host.undo()
+        assert host.undo() and extras(session) == {}
+        with pytest.raises(CommandRejected, match="nothing of it is done"):
+            session.set_extra("c", 1)
     assert extras(session) == {}
     session.set_extra("c", 1)
     assert extras(session) == {"c": 1}
