@@ -162,7 +162,7 @@ def reason(error: Exception) -> str:
     if isinstance(error, UnicodeEncodeError):
         return "USD has no way to say a name that is not Unicode. Rename it."
     try:
-        said = error.args[0].commentary if isinstance(error, Tf.ErrorException) else str(error)
+        said = error.args[0].commentary if isinstance(error, Tf.ErrorException) and error.args else str(error)
     except UnicodeDecodeError:
         said = ""
     return " ".join(re.sub(r"matching \S*(?=.* at ')|pxrInternal_\w*::", "", said).split()) or "it is damaged."
