@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from contact_core.plugins.manager import PluginManager
 
 
 class History:
@@ -19,8 +15,9 @@ class History:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.edit.tell import history_lines
+        from contact_core.plugins.verbs import know_commands
 
-        _know_commands(arguments.plugins)
+        know_commands(arguments.plugins)
         lines = history_lines(arguments.file)
         arguments.output.answer({"edits": lines}, "\n".join(lines) or "no edits")
         return 0
@@ -36,8 +33,9 @@ class Replay:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.edit.tell import replay_lines
+        from contact_core.plugins.verbs import know_commands
 
-        _know_commands(arguments.plugins)
+        know_commands(arguments.plugins)
         lines = replay_lines(arguments.journal, arguments.out)
         written = None if arguments.out is None else str(arguments.out)
         arguments.output.answer({"told": lines, "written": written}, "\n".join(lines))
@@ -58,12 +56,3 @@ class Diff:
         lines = diff_lines(arguments.before, arguments.after)
         arguments.output.answer({"changes": lines}, "\n".join(lines) or "nothing changed")
         return int(bool(lines))
-
-
-def _know_commands(plugins: PluginManager) -> None:
-    """A journal may hold commands of plugins; they must be known before it is replayed."""
-    from contact_core.edit.command import register_command
-    from contact_core.plugins.registry import COMMANDS
-
-    for command in plugins.offers(COMMANDS).values():
-        register_command(command)

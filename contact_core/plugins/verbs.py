@@ -16,6 +16,14 @@ if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
 
 
+def know_commands(plugins: PluginManager) -> None:
+    """Make the commands of plugins known, so that journals which hold them replay. InvalidInput on a clash."""
+    from contact_core.plugins.registry import COMMANDS
+
+    for command in plugins.offers(COMMANDS).values():
+        register_command(command)
+
+
 class PluginVerbs(Verbs, SurfaceVerbs):
     """An editor with a plugin manager of its own, which looks for plugins at the first use."""
 
@@ -36,10 +44,7 @@ class PluginVerbs(Verbs, SurfaceVerbs):
 
     def register_commands(self) -> None:
         """Make the commands of plugins known, so that journals which hold them replay."""
-        from contact_core.plugins.registry import COMMANDS
-
-        for command in self.plugins.offers(COMMANDS).values():
-            register_command(command)
+        know_commands(self.plugins)
 
     def default_axis(self, surface: str, patch: str, points: SurfacePoints, generator: str | None) -> SurfacePoints:
         """Axis points from an axis generator: the one named, or the one that the plugins choose."""
