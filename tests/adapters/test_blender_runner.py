@@ -36,12 +36,13 @@ def test_temporary_files_and_settings_go_with_the_process(run_tests: ModuleType,
     """Also of one that leaves without its own end, as Blender's tests do."""
     text = """
 import os, tempfile
-print(tempfile.mkdtemp(prefix="blender_"), os.environ["BLENDER_USER_RESOURCES"], flush=True)
+print(tempfile.mkdtemp(prefix="blender_"), os.environ["BLENDER_USER_RESOURCES"], sep="\\n", flush=True)
 os._exit(3)
 """
     done = run_tests.run_script(PYTHON, script(tmp_path, text))
     assert done.returncode == 3, done.stderr
-    for folder in map(Path, done.stdout.split()):
+    assert len(done.stdout.splitlines()) == 2
+    for folder in map(Path, done.stdout.splitlines()):
         assert "contact-blender-" in str(folder) and not folder.exists()
 
 
