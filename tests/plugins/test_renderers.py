@@ -149,6 +149,8 @@ def test_pictures_stand_side_by_side(tmp_path: Path) -> None:
     assert image.shape == (80, 160, 3)
     np.testing.assert_array_equal(image[:, :80], image[:, 80:])
     assert OVERSAMPLE == 2
+    SoftwareRenderer().render([Picture((ball,))] * 3, tmp_path / "three.png", size=(160, 80))
+    assert decoded((tmp_path / "three.png").read_bytes()).shape == (80, 160, 3)
 
 
 def test_refusals(tmp_path: Path) -> None:

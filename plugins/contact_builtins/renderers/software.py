@@ -6,6 +6,7 @@ wins. Each pixel is drawn at twice the size and averaged, which is all the anti-
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -40,8 +41,9 @@ class SoftwareRenderer:
         """Draw pictures side by side into one PNG. Raises InvalidInput, FileRefused."""
         if not pictures or min(size) < 16 or max(size) > 8192:
             raise InvalidInput(f"a picture needs content and 16 to 8192 pixels a side, but {size} came.")
-        width = size[0] // len(pictures)
-        panels = [draw(picture, (width, size[1])) for picture in pictures]
+        edges = [size[0] * place // len(pictures) for place in range(len(pictures) + 1)]
+        widths = [right - left for left, right in itertools.pairwise(edges)]
+        panels = [draw(picture, (width, size[1])) for picture, width in zip(pictures, widths, strict=True)]
         write_png(np.concatenate(panels, axis=1), path)
 
 
