@@ -193,6 +193,19 @@ def test_guided_runs_away_from_the_thumb(lengths: list[float], wanted: float, ow
     assert direction(request, Guided().generate(request))[0] * wanted > 0.99
 
 
+def test_bones_without_length_hide_no_thumb() -> None:
+    """Rigs put helper joints onto others: the digits part there all the same, seen from the last bone of one."""
+    bones = fan([0.4, 0.8, 0.9, 0.8, 0.7])
+    helpers = np.repeat(bones.reshape(-1, 1, 3), 2, axis=1)  # (2b, 2, 3)
+    request = replace(strip(0.0), bones=np.concatenate([helpers, bones]), bone_of_point=np.full(160, 20 + 9))
+    found, plain = (
+        towards_thumb(request),
+        towards_thumb(replace(request, bones=bones, bone_of_point=np.full(160, 9))),
+    )
+    assert found is not None and plain is not None
+    assert found == pytest.approx(plain)
+
+
 def test_guided_goes_with_the_axes_drawn_already_where_no_digit_is_a_thumb() -> None:
     request = replace(strip(1.4), bones=np.array([[[0.0, 0.5, -0.3], [1.0, 0.5, -0.3]]]))
     for sign in (1, -1):

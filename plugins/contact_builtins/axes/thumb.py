@@ -32,7 +32,7 @@ def towards_thumb(request: AxisRequest) -> FloatArray | None:
         if not is_head:  # first the digits that part at the bone's end, as from the palm's; then up the tree
             joint, is_head = heads[bone], True
             continue
-        above = np.flatnonzero(_at(tails, joint, near))
+        above = np.flatnonzero(_at(tails, joint, near) & ~_at(heads, joint, near))
         if not len(above):
             return None
         bone = int(above[0])
