@@ -114,17 +114,30 @@ def _no_deeper(
     Where the walls gave way they are moved, and the pose alone goes on: it is smooth, while points jump where the
     path to them passes a vertex.
     """
-    bound, begin = DepthBound.of(problem, solids), problem
+    bound, begin, rounds = DepthBound.of(problem, solids), problem, list[PoseSolution]()
     for _ in range(ROUNDS):
         wall = bound.term()
         found = solver.solve(replace(begin, terms=(*problem.terms, wall)), options, progress)
-        theta = problem.theta_of(found.poses)
+        theta = problem.theta_of(found.poses) if rounds else found.theta  # later rounds solve for the pose alone
+        rounds.append(found)
         now = measured(problem, theta, bound.solids)
         if found.status is SolveStatus.CANCELLED or bound.holds(now):
             value = found.value - found.terms[wall.name]
-            return replace(found, problem=problem, theta=theta, value=value, start_value=fixed.value)
+            return _in_all(
+                rounds, replace(found, problem=problem, theta=theta, value=value, start_value=fixed.value)
+            )
         slid = {name: pose.joints for name, pose in found.poses.items() if name.endswith(SLIDING)}
         begin, bound = replace(problem.at(theta), held={**(problem.held or {}), **slid}), bound.tightened(now)
     note = f"After {ROUNDS} rounds skin was still deeper than before, so the contacts stay where they are."
     still = replace(fixed, problem=problem, theta=problem.start, start_value=fixed.value)
-    return replace(still, notes=(*fixed.notes, note))
+    return _in_all(rounds, replace(still, notes=(*fixed.notes, note)))
+
+
+def _in_all(rounds: Sequence[PoseSolution], answer: PoseSolution) -> PoseSolution:
+    """An answer with what all rounds took."""
+    return replace(
+        answer,
+        trace=tuple(value for found in rounds for value in found.trace),
+        evaluations=sum(found.evaluations for found in rounds),
+        seconds=sum(found.seconds for found in rounds),
+    )
