@@ -136,10 +136,12 @@ class Session(PluginVerbs, ProposalVerbs):
         Raises FileRefused where the end could not be recorded; everything is let go of all the same.
         """
         link, self._host_link = self._host_link, None
-        if link is not None:
-            link.close()
-        if self._file is not None:
-            self._file.close(in_order=discard or self.history.is_clean)
+        try:
+            if link is not None:
+                link.close()
+        finally:
+            if self._file is not None:
+                self._file.close(in_order=discard or self.history.is_clean)
 
     def __enter__(self) -> Session:
         return self
