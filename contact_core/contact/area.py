@@ -14,6 +14,7 @@ from contact_core.arrays import ComplexArray, FloatArray, IntArray, frozen
 from contact_core.contact.shape import AxisShape, PatchCoordinates, PatchShape
 
 LONGEST_EDGE = 3.0  # times the spacing of the points: longer edges bridge a gap or a notch
+FLAT = 1e-9  # a triangle no higher than this part of its longest edge has no area: its three corners lie on the rim
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ def _triangulate(layout: ComplexArray, positions: FloatArray) -> IntArray:
     np.minimum.at(shortest, triangles, np.minimum(flat, np.roll(flat, 1, axis=1)))
     spacing = float(np.percentile(shortest[np.isfinite(shortest)], 90))
     kept = (flat <= LONGEST_EDGE * spacing).all(axis=1) & (steep <= 2.0 * LONGEST_EDGE * spacing).all(axis=1)
-    return triangles[kept]
+    return triangles[kept & (np.abs(cross) > FLAT * flat.max(axis=1) ** 2)]
 
 
 def _loops(triangles: IntArray) -> tuple[tuple[int, ...], ...]:

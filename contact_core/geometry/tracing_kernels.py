@@ -23,7 +23,6 @@ from contact_core.geometry.tangent_kernels import (
     corner_at_angle,
     direction_of_next,
     heading_at,
-    norm,
     place,
     turned,
     turned_back,
@@ -193,12 +192,14 @@ def walk(
             inverse = 1.0 / across
             step = max(((ox - x) * uy + y * ux) * inverse, 0.0)
             along = min(max(((ox - x) * dy + y * dx) * inverse, 0.0), size)  # from the tail or head to the apex
-        at_vertex = along <= near or size - along <= near
+        at_vertex, arrival = along <= near or size - along <= near, near
         if at_vertex:  # the way to the vertex, not to where the ray leaves beside it
             along = 0.0 if along <= near else size
             vx, vy = ox + along * ux - x, along * uy - y
             step, miss = max(vx * dx + vy * dy, 0.0), vy * dx - vx * dy
-        if remaining <= step + (JOINT * size if to_joint and at_vertex else near):
+            if to_joint:
+                arrival = JOINT * size
+        if remaining <= step + arrival:
             step = min(step, remaining)
             return DONE, h, x + step * dx, y + step * dy, dx, dy, 0.0, line_end
         remaining -= step
@@ -246,27 +247,29 @@ def walk(
 @inlined
 def corner_near(h: int, x: float, y: float, part: float, shape: FloatArray) -> int:
     """The corner, by its halfedge, that (x, y) in the frame of h lies within a part of an edge of; -1 if none."""
-    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
-    near = part * max(length, shape[following(h), 0])
-    if norm(x, y) <= near:
-        return h
-    if norm(x - length, y) <= near:
-        return following(h)
-    return preceding(h) if norm(x - ax, y - ay) <= near else -1
+    length, near = shape[h, 0], part * max(shape[h, 0], shape[following(h), 0])
+    if y <= near:
+        if abs(x) <= near:
+            return h
+        if abs(x - length) <= near:
+            return following(h)
+    return preceding(h) if abs(x - shape[h, 1]) <= near and abs(y - shape[h, 2]) <= near else -1
 
 
 @inlined
 def moved_into_face(h: int, x: float, y: float, shape: FloatArray) -> tuple[float, float]:
     """(x, y) in the frame of h, or the nearest point of the edge that rounding put it beyond. (To clip barycentric
     coordinates instead would move it a million times as far, near the corner of a sliver.)"""
-    length, left_length, right_length = shape[h, 0], shape[preceding(h), 0], shape[following(h), 0]
-    ux, uy = shape[h, 1] / left_length, shape[h, 2] / left_length
-    if ux * y - uy * x > 0.0:
+    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    if ax * y > ay * x:
+        left_length = shape[preceding(h), 0]
+        ux, uy = ax / left_length, ay / left_length
         t = min(max(x * ux + y * uy, 0.0), left_length)
         x, y = t * ux, t * uy
-    ux, uy = direction_of_next(h, shape)
-    if ux * y - uy * (x - length) < 0.0:
-        t = min(max((x - length) * ux + y * uy, 0.0), right_length)
+    rx, ry = -shape[following(h), 1], shape[following(h), 2]  # along the edge on the right, times the length
+    if rx * y < ry * (x - length):
+        ux, uy = rx / length, ry / length
+        t = min(max((x - length) * ux + y * uy, 0.0), shape[following(h), 0])
         x, y = length + t * ux, t * uy
     return x, max(y, 0.0)
 
