@@ -165,7 +165,8 @@ def placements(grips: Sequence[Grip], count: int, starts: int) -> list[str]:
 HEAD = """# Grips, measured
 
 Written by `python benchmarks/pose_grips.py`; run it again to check. Recipes of `contact demo` and
-`benchmarks/grips`, on built-in assets, and of `examples/`; lengths in % of the hand's length, times in milliseconds.
+of `benchmarks/grips`, on built-in assets, and of `examples/`; lengths in % of the hand's length, times in
+milliseconds.
 """
 
 PARTS = {  # section titles of the page, in order
