@@ -14,7 +14,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.testing.meshes import FAMILIES
 from contact_core.testing.strategies import cached_family, family_names, surface_points
 
-CLOSED = ("sphere", "torus", "noisy")
+CLOSED = ("sphere", "torus", "noisy", "blocks")
 seeds = st.integers(0, 2**32 - 1)
 
 
