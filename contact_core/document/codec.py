@@ -97,16 +97,23 @@ def pretty(data: Any, indent: int = 0) -> str:
         lines = [f"{pad}{json.dumps(key)}: {pretty(data[key], indent + 1)}" for key in sorted(data)]
         return "{\n" + ",\n".join(lines) + "\n" + " " * indent + "}"
     if isinstance(data, list) and data and isinstance(data[0], (list, dict)):
-        if all(isinstance(item, list) and len(item) <= 4 for item in data):
+        if all(_is_row(item) for item in data):
             return _rows(data, pad, indent)
+        if all(isinstance(item, list) and all(_is_row(row) for row in item) for item in data):  # matrices
+            return _rows(data, pad, indent, 1)
         return "[\n" + ",\n".join(pad + pretty(item, indent + 1) for item in data) + "\n" + " " * indent + "]"
     if isinstance(data, list) and len(data) > ROW:
         return _rows(data, pad, indent)
     return json.dumps(data, allow_nan=False)
 
 
-def _rows(data: list[Any], pad: str, indent: int) -> str:
-    rows = (json.dumps(data[k : k + ROW], allow_nan=False)[1:-1] for k in range(0, len(data), ROW))
+def _is_row(item: Any) -> bool:
+    """Whether data are a point, a face or a row of a matrix."""
+    return isinstance(item, list) and len(item) <= 4 and not any(isinstance(x, (list, dict)) for x in item)
+
+
+def _rows(data: list[Any], pad: str, indent: int, per_line: int = ROW) -> str:
+    rows = (json.dumps(data[k : k + per_line], allow_nan=False)[1:-1] for k in range(0, len(data), per_line))
     return "[\n" + ",\n".join(pad + row for row in rows) + "\n" + " " * indent + "]"
 
 
