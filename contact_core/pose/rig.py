@@ -117,9 +117,8 @@ class Rig:
                 f"a rig needs one freedom per joint: {j} joints, but {len(self.freedoms)} freedoms came."
             )
         if n and (self.skin_joints.min() < 0 or self.skin_joints.max() >= j):
-            raise InvalidInput(
-                f"skin_joints must be in 0..{j - 1}, but {int(self.skin_joints.max())} came among them."
-            )
+            wrong = self.skin_joints[(self.skin_joints < 0) | (self.skin_joints >= j)]
+            raise InvalidInput(f"skin_joints must be in 0..{j - 1}, but {int(wrong[0])} came among them.")
         off = np.abs(self.skin_weights.sum(axis=1) - 1.0) if n else np.zeros(0)
         if (off > 1e-6).any():
             raise InvalidInput(
