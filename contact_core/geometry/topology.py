@@ -48,7 +48,12 @@ class Topology:
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Topology:
-        """The topology of a mesh: built at the first call (about a second per million faces), then kept on it."""
+        """The topology of a mesh: built at the first call (about a second per million faces), then kept on it.
+
+        Raises InvalidInput for what is no mesh.
+        """
+        if not isinstance(mesh, TriangleMesh):
+            raise InvalidInput(f"the mesh must be a TriangleMesh(points, faces), but {type(mesh).__name__} came.")
         kept = mesh.__dict__.get("_topology")
         if kept is None:
             kept = mesh.__dict__["_topology"] = cls._build(mesh)

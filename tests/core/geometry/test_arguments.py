@@ -25,6 +25,8 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "a mesh that vanishes when squared": (lambda: TriangleMesh(np.array(P) * 1e-150, [[0, 1, 2]]), "another unit"),
     "a mesh that overflows when squared": (lambda: TriangleMesh(np.array(P) * 1e160, [[0, 1, 2]]), "another unit"),
     "barycentrics that do not sum to one": (lambda: SurfacePoints([0], [[0.2, 0.3, 0.4]]), "sum to 1"),
+    "nothing as a mesh": (lambda: log_map(None, HERE, HERE), "must be a TriangleMesh"),  # type: ignore[arg-type]
+    "points as a mesh": (lambda: trace_geodesic([[0.0]], HERE, [1.0]), "must be a TriangleMesh"),  # type: ignore[arg-type]
     "a tuple as sources": (lambda: log_map(BALL, ([0], [[0.2, 0.3, 0.5]]), HERE), "sources must be SurfacePoints"),  # type: ignore[arg-type]
     "a number as targets": (lambda: log_map(BALL, HERE, 3), "targets must be SurfacePoints"),  # type: ignore[arg-type]
     "a source outside": (lambda: log_map(BALL, NOWHERE, HERE), "sources must lie in faces"),
