@@ -86,7 +86,8 @@ def test_contradictions_are_named(says: str, change: Change) -> None:
         ('"mirrored": ', '"mirrored": true, "mirrored": ', "names 'mirrored' twice"),
         ('"weight": ', '"weight": NaN, "w": ', "not a number that a document may hold"),
         ('"spread": 1.0', '"spread": 1e999', "wants a finite number, but inf"),
-        ('"extras": {', '"extras": {"x": ' + 5000 * "[" + 5000 * "]" + ", ", "not valid JSON"),
+        # from Python 3.12 on the JSON reader takes deeper data, and the document's own bound refuses it
+        ('"extras": {', '"extras": {"x": ' + 5000 * "[" + 5000 * "]" + ", ", "not valid JSON|at most 100 levels"),
     ],
 )
 def test_text_that_only_looks_like_a_document_is_refused(old: str, new: str, says: str) -> None:

@@ -90,6 +90,14 @@ def killed_child(path: Path, seed: int, delay: float) -> int:
 
 @posix
 def test_200_kills_lose_nothing_that_was_acknowledged(tmp_path: Path) -> None:
+    """In a process of their own, which has no thread while it forks."""
+    kills = subprocess.run(
+        [sys.executable, __file__, str(tmp_path)], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert kills.returncode == 0, kills.stderr
+
+
+def kill_200_times(tmp_path: Path) -> None:
     """After each kill the document is the acknowledged one, or that of the one action that was under way."""
     actions, history = 0, History(ContactDocument())
     for number in range(200):
@@ -309,3 +317,7 @@ def test_a_newer_journal_is_refused_and_left_untouched(tmp_path: Path) -> None:
     with pytest.raises(FileRefused, match=r"version 99.*newer contact-core"):
         open_file(path)
     assert journal_path(path).read_bytes() == header
+
+
+if __name__ == "__main__":
+    kill_200_times(Path(sys.argv[1]))
