@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.elements import EXCESS
 from contact_core.geometry.jit import constant, inlined, kernel
 from contact_core.geometry.topology_kernels import (
     BLOCKED_VERTEX,
@@ -27,7 +28,6 @@ ON_NOTHING = constant(3)  # in a face without three corners; element: its halfed
 # A point this near to an edge or a vertex, as a fraction of the longest edge of its face, lies on it. A distance,
 # not a barycentric coordinate: in a face a million times longer than high, that would be a million times off.
 SNAP = 1e-11
-EXCESS = 1e-11  # radians by which a vertex must exceed a flat one for paths to bend round it
 PI = math.pi
 
 

@@ -8,21 +8,21 @@ needs to be manifold: what is not is marked BLOCKED, and a query that reaches it
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput, NotManifold
+from contact_core.geometry.elements import (
+    BLOCKED,
+    BLOCKED_VERTEX,
+    BOUNDARY,
+    BOUNDARY_VERTEX,
+    EXCESS,
+    UNUSED_VERTEX,
+)
 from contact_core.geometry.flat_faces import mollify
 from contact_core.geometry.mesh import TriangleMesh
-
-BOUNDARY: Final = -1  # a twin: no face on the other side
-BLOCKED: Final = -2  # a twin: the edge is not manifold, or its face has no three corners
-INTERIOR_VERTEX: Final = 0
-BOUNDARY_VERTEX: Final = 1
-BLOCKED_VERTEX: Final = 2  # its faces do not form one fan
-UNUSED_VERTEX: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,6 @@ class Topology:
     @classmethod
     def _build(cls, mesh: TriangleMesh) -> Topology:
         from contact_core.geometry import topology_kernels as kernels
-        from contact_core.geometry.tangent_kernels import EXCESS
 
         n, count = len(mesh.points), 3 * len(mesh.faces)
         shape = np.zeros((count, 4))

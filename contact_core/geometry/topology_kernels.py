@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry import topology
+from contact_core.geometry import elements
 from contact_core.geometry.flat_faces import FLAT
 from contact_core.geometry.jit import constant, inlined, kernel
 
-BOUNDARY = constant(topology.BOUNDARY)
-BLOCKED = constant(topology.BLOCKED)
-INTERIOR_VERTEX = constant(topology.INTERIOR_VERTEX)
-BOUNDARY_VERTEX = constant(topology.BOUNDARY_VERTEX)
-BLOCKED_VERTEX = constant(topology.BLOCKED_VERTEX)
+BOUNDARY = constant(elements.BOUNDARY)
+BLOCKED = constant(elements.BLOCKED)
+INTERIOR_VERTEX = constant(elements.INTERIOR_VERTEX)
+BOUNDARY_VERTEX = constant(elements.BOUNDARY_VERTEX)
+BLOCKED_VERTEX = constant(elements.BLOCKED_VERTEX)
 
 
 @inlined

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from contact_core.errors import ContactError, InvalidInput, NotManifold
 from contact_core.geometry import SurfacePoints, Topology, TriangleMesh, log_map, trace_chains, trace_geodesic
-from contact_core.geometry.topology import BLOCKED, BOUNDARY, BOUNDARY_VERTEX
+from contact_core.geometry.elements import BLOCKED, BOUNDARY, BOUNDARY_VERTEX
 from contact_core.testing import meshes
 from contact_core.testing.strategies import cached_family
 
