@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,9 +145,9 @@ def _local(entry: dict[str, Any], index: int) -> FloatArray:
         matrix = np.array(entry["matrix"], np.float64).reshape(4, 4).T  # stored column by column
     else:
         x, y, z, w = _numbers(entry, "rotation", (0, 0, 0, 1))
-        norm = float(np.sqrt(x * x + y * y + z * z + w * w))
-        if norm == 0.0:
-            raise InvalidInput(f"node {index} has a zero rotation quaternion")
+        norm = math.hypot(x, y, z, w)
+        if not 0.0 < norm < math.inf:
+            raise InvalidInput(f"node {index} has a rotation quaternion of length {norm}")
         matrix = np.eye(4)
         matrix[:3, :3] = rotation_matrix(np.array([w, x, y, z]) / norm) * _numbers(entry, "scale", (1, 1, 1))
         matrix[:3, 3] = _numbers(entry, "translation", (0, 0, 0))

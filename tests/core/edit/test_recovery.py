@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from contact_core.document.document import ContactDocument
@@ -36,6 +36,7 @@ def kept_beside(path: Path) -> list[bytes]:
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 10**6), position=st.floats(0.0, 1.0), backwards=st.integers(0, 4))
+@example(seed=3825, position=0.9375, backwards=1)
 def test_a_history_that_began_elsewhere_is_recovered_with_all_its_steps(
     tmp_path_factory: pytest.TempPathFactory, seed: int, position: float, backwards: int
 ) -> None:
@@ -59,7 +60,8 @@ def test_a_history_that_began_elsewhere_is_recovered_with_all_its_steps(
     with Session.open(path, discover=False) as again:
         assert dump_document(again.document) == dump_document(session.document)
         assert again.revision == session.revision
-        assert again.history.is_clean == session.history.is_clean
+        # saved is what the file says: after the undo of a step that changed nothing, too
+        assert again.history.is_clean == (dump_document(session.document) == path.read_bytes())
         assert [step.revision for step in again.history.steps] == [s.revision for s in session.history.steps]
         while again.history.can_undo:
             again.undo()
