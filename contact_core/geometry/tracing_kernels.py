@@ -175,7 +175,8 @@ def walk(
             x, y, dx, dy = 0.0, 0.0, math.cos(angle), math.sin(angle)
             vertex = -1
         length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
-        right = from_vertex or dx * (ay - y) - dy * (ax - x) > 0.0
+        side = dx * (ay - y) - dy * (ax - x)
+        right = from_vertex or side > 0.0 or (side == 0.0 and ay == 0.0 and dx > 0.0)  # along a flat face: ahead
         if right:  # through the edge from the head to the apex
             edge, ox = following(h), length
             size = shape[edge, 0]

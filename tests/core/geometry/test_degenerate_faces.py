@@ -7,6 +7,7 @@ Edges of no length are merged by the topology, faces with three corners on a lin
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -83,6 +84,16 @@ def test_log_then_exp_across_edges_without_length(data: st.DataObject, name: str
     )
     miss = np.linalg.norm(end.points.positions(mesh) - targets.positions(mesh), axis=1).max()
     assert miss <= 1e-7 * mesh.bounding_box_diagonal
+
+
+@pytest.mark.parametrize("weights", [[0.2, 0.4, 0.4], [0.3, 0.3, 0.4], [0.4, 0.4, 0.2], [0.0, 0.8, 0.2]])
+def test_a_walk_along_a_face_without_area_meets_the_vertex_ahead(weights: list[float]) -> None:
+    """Found by `make explore`: the corners of face 4 lie on a line, and the way runs along it."""
+    mesh = with_collapsed_edges("blocks", 820508)
+    corners = mesh.points[mesh.faces[4]]
+    assert np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])) == 0.0
+    inside, ends = SurfacePoints([4], [weights]), SurfacePoints([4, 4, 4, 0], [*np.eye(3), [1.0, 0.0, 0.0]])
+    assert miss_of_exp_after_log(mesh, inside, ends) <= 1e-13
 
 
 @given(data=st.data(), name=family_names(without=("sliver",)), seed=st.integers(0, 2**32 - 1))
