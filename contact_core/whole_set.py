@@ -18,7 +18,8 @@ def replacing_together(folder: Path, names: Collection[str]) -> Iterator[Path]:
 
     names: of all files of the set. The old ones stay as they are until the last of the new is on the disk; one
     that the new set lacks (a picture that nothing could draw) is gone afterwards. Whoever publishes at the same
-    moment waits, so that two sets never mix. Raises FileRefused.
+    moment waits, so that two sets never mix; only a process killed between two renames leaves some of each. Raises
+    FileRefused.
     """
     check_writable(folder, names)
     made = [place for place in (folder, *folder.parents) if not place.exists()]
@@ -27,10 +28,12 @@ def replacing_together(folder: Path, names: Collection[str]) -> Iterator[Path]:
         stage = Path(tempfile.mkdtemp(prefix=".contact-", dir=folder))
     except OSError as error:
         raise FileRefused(f"cannot write into {folder}: {error.strerror or error}.") from error
+    untouched = True
     try:
         yield stage
         with _alone(folder):
             written = sorted(path.name for path in stage.iterdir())
+            untouched = False
             for name in written:
                 (stage / name).replace(folder / name)
             for name in set(names) - set(written):  # what an earlier run left would not belong to this set
@@ -38,9 +41,10 @@ def replacing_together(folder: Path, names: Collection[str]) -> Iterator[Path]:
     except FileRefused as error:  # in the words of the folder that was asked for
         raise FileRefused(str(error).replace(str(stage), str(folder))) from error
     except OSError as error:
-        raise FileRefused(
-            f"cannot write into {folder}: {error.strerror or error}. What was there before is untouched."
-        ) from error
+        state = (
+            "What was there before is untouched." if untouched else "Run it again: its files may be of two runs."
+        )
+        raise FileRefused(f"cannot write into {folder}: {error.strerror or error}. {state}") from error
     finally:
         shutil.rmtree(stage, ignore_errors=True)
         with contextlib.suppress(OSError):  # what was made for nothing goes; a folder that holds anything stays

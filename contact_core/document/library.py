@@ -35,10 +35,6 @@ class ContactSet:
     pairs: FrozenMap[ContactPair] = field(default_factory=FrozenMap)
     groups: FrozenMap[tuple[str, ...]] = field(default_factory=FrozenMap)
 
-    def tree_roots(self) -> tuple[str, ...]:
-        """The patches that hang on no other: what has to be placed on another manipulator."""
-        return tuple(name for name, patch in self.patches.items() if not isinstance(patch.placement, Link))
-
     def parents_first(self) -> tuple[Patch, ...]:
         """The patches so that each comes after the one it hangs on."""
         ordered: dict[str, Patch] = {}

@@ -160,14 +160,13 @@ class Journal:
 class JournalContents:
     """A journal as read. base: the first document. file_digest: of the document file then, None if none.
 
-    events: the whole events. good_bytes: how far the file is sound. damage: None, or a sentence on what follows.
+    events: the whole events. damage: None, or a sentence on what follows.
     """
 
     base: ContactDocument
     base_revision: int
     file_digest: str | None
     events: tuple[dict[str, Any], ...]
-    good_bytes: int
     damage: str | None
 
     @property
@@ -189,14 +188,13 @@ class JournalContents:
 
 def read_journal(path: Path) -> JournalContents:
     """The sound part of a journal. Raises FileRefused when not even the first line is."""
-    good, damage, records = 0, None, []
+    damage, records = None, []
     for number, line in enumerate(_lines(read_whole(path, MAX_BYTES)), start=1):
         event = decode_line(line)
         if event is None:
             damage = f"line {number} of {path.name} is damaged or was cut off; all before it is whole."
             break
         records.append(event)
-        good += len(line)
     if not records:
         raise FileRefused(f"{path} is damaged from its first line on; nothing can be recovered from it.")
     header = records[0]
@@ -205,7 +203,7 @@ def read_journal(path: Path) -> JournalContents:
     revision, digest = _whole_number(body, "revision"), body.get("file")
     if not (digest is None or isinstance(digest, str)):
         raise FileRefused(f"{path} names no document file that could be ({str(digest)[:60]!r}).")
-    return JournalContents(base, revision, digest, tuple(records[1:]), good, damage)
+    return JournalContents(base, revision, digest, tuple(records[1:]), damage)
 
 
 def replay(contents: JournalContents) -> tuple[History, str | None]:

@@ -62,7 +62,6 @@ class Locator:
         if not len(mesh.faces):
             raise InvalidInput("spatial queries need a mesh with faces, but it has none.")
         Locator.builds += 1
-        self.mesh_size = len(mesh.faces)
         self._tree = box_tree.build(mesh.points, mesh.faces)
         self._normals = mesh.face_normals
         self._dipoles: box_tree.Dipoles | None = None

@@ -16,8 +16,7 @@ from contact_core.plugins.registry import resolve
 
 GROUP = "contact_core.plugins"
 VARIABLE = "CONTACT_PLUGINS"
-Origin = Literal["built-in", "entry point", "environment", "session"]
-PRECEDENCE: tuple[Origin, ...] = ("built-in", "entry point", "environment", "session")  # the last one wins
+Origin = Literal["built-in", "entry point", "environment", "session"]  # the last one wins
 _OWN_DISTRIBUTION = "contact-core"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import TYPE_CHECKING
 
 from contact_core.edit.verbs import SurfaceVerbs, Verbs
@@ -18,18 +19,18 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
     """Settle, slide, accept, dismiss."""
 
     @property
+    @abstractmethod
     def plugins(self) -> PluginManager:
         """The plugins of the session."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def revision(self) -> int:
         """Revision of the committed document."""
-        raise NotImplementedError
 
+    @abstractmethod
     def show_ghost(self, ghost: Proposal | None) -> None:
         """Tell listeners of a preview; None: back to the document."""
-        raise NotImplementedError
 
     def settle(
         self, *, rounds: int = ROUNDS, reach: float = REACH, settings: ProposalSettings | None = None

@@ -16,7 +16,7 @@ NAMES = ("pose", "picture", "report")
 
 
 def contents(folder: Path) -> dict[str, str]:
-    return {path.name: path.read_text() for path in folder.iterdir()}
+    return {path.name: path.read_text() for path in folder.iterdir() if path.is_file()}
 
 
 def publish(folder: Path, word: str, names: tuple[str, ...] = NAMES) -> None:
@@ -49,6 +49,16 @@ def test_what_fails_inside_is_told_of_the_folder_that_was_named(tmp_path: Path) 
         (stage / "pose").mkdir()
         write_whole(stage / "pose", "x")
     assert str(tmp_path / "out" / "pose") in str(told.value) and ".contact-" not in str(told.value)
+
+
+def test_a_rename_that_fails_does_not_claim_that_nothing_changed(tmp_path: Path) -> None:
+    publish(tmp_path, "first")
+    with pytest.raises(FileRefused, match="may be of two runs"), replacing_together(tmp_path, NAMES) as stage:
+        for name in NAMES:
+            write_whole(stage / name, "second")
+        (tmp_path / "report").unlink()
+        (tmp_path / "report").mkdir()  # somebody else's, in the meantime
+    assert contents(tmp_path) == {"pose": "second", "picture": "second"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="folders are not locked on Windows")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 from pxr import Usd
@@ -26,12 +27,12 @@ def read_freedoms(prim: Usd.Prim, count: int) -> tuple[JointFreedom, ...]:
         raise InvalidInput(f"{FREEDOMS} is damaged: {error}") from error
 
 
-def freedom_from_json(data: dict[str, object]) -> JointFreedom:
+def freedom_from_json(data: dict[str, Any]) -> JointFreedom:
     """A joint's freedom; limits that are null are free."""
     values = dict(data)
     for key, free in (("lower", -np.inf), ("upper", np.inf)):
-        values[key] = [free if v is None else v for v in values[key]]  # type: ignore[attr-defined]
-    return JointFreedom(**values)  # type: ignore[arg-type]
+        values[key] = [free if v is None else v for v in values[key]]
+    return JointFreedom(**values)
 
 
 def freedom_to_json(freedom: JointFreedom) -> dict[str, object]:

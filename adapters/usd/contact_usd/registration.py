@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from pxr import Plug, Sdf, Usd
+from pxr import Plug, Usd
 
 from contact_usd.schema_dir import ENVIRONMENT_VARIABLE, schema_dir
 
@@ -32,14 +32,3 @@ def problem() -> str | None:
         f" import contact_usd.host before the first stage is opened, or start the host with {ENVIRONMENT_VARIABLE}"
         f" containing {schema_dir()}."
     )
-
-
-def apply_schema(prim: Usd.Prim, schema: str) -> None:
-    """Apply an API schema of ours, known to this process or not."""
-    prim.AddAppliedSchema(schema)
-
-
-def has_schema(prim: Usd.Prim, schema: str) -> bool:
-    """Whether the prim says it has the schema; HasAPI would not see a schema that USD does not know."""
-    applied = prim.GetMetadata("apiSchemas")
-    return isinstance(applied, Sdf.TokenListOp) and schema in applied.GetAppliedItems()

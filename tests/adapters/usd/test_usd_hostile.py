@@ -109,13 +109,13 @@ def written(path: Path, text: str) -> Path:
 
 def skinned(skeleton: str, skin: str, animation: str = "") -> str:
     """A SkelRoot with a skeleton, one triangle that it drives, and perhaps an animation."""
-    bound = "rel skel:animationSource = </root/walk>\n" if animation else ""
+    bound = "rel skel:animationSource = </figure/walk>\n" if animation else ""
     return f"""(metersPerUnit = 1)
-def SkelRoot "root" {{
+def SkelRoot "figure" {{
 def Skeleton "bones" (prepend apiSchemas = ["SkelBindingAPI"]) {{
 {skeleton}{bound}}}
 def Mesh "skin" (prepend apiSchemas = ["SkelBindingAPI"]) {{
-{TRIANGLE}rel skel:skeleton = </root/bones>
+{TRIANGLE}rel skel:skeleton = </figure/bones>
 {skin}}}
 {animation}}}
 """
@@ -139,20 +139,20 @@ def test_skeletons_that_do_not_fit_together_are_refused_by_name(what: str, tmp_p
     skeleton, skin, words = SKELETONS[what]
     host = UsdHost(written(tmp_path / "bad.usda", skinned(skeleton, skin)))
     with pytest.raises(InvalidInput, match=words) as refused:
-        host.read_rig("/root/bones")
-    assert "/root/" in str(refused.value)
+        host.read_rig("/figure/bones")
+    assert "/figure/" in str(refused.value)
     for call in (host.read_pose, host.pose_keys):  # these may have an answer; if not, in words
         try:
-            call("/root/bones")
+            call("/figure/bones")
         except InvalidInput as error:
             assert str(error)
 
 
 def test_the_plain_skeleton_of_these_tests_is_a_rig(tmp_path: Path) -> None:
     host = UsdHost(written(tmp_path / "good.usda", skinned(JOINTS, SKIN)))
-    rig = host.read_rig("/root/bones").rig
+    rig = host.read_rig("/figure/bones").rig
     assert rig is not None and len(rig.joints) == 2
-    host.skin_points("/root/bones", Pose.rest(rig))
+    host.skin_points("/figure/bones", Pose.rest(rig))
 
 
 @pytest.mark.parametrize("damage", ["rotations = [(nan, 0, 0, 0), (1, 0, 0, 0)]", "rotations = []"])
@@ -166,20 +166,20 @@ quatf[] {damage}
 """
     host = UsdHost(written(tmp_path / "walk.usda", skinned(JOINTS, SKIN, animation)))
     if "nan" in damage:
-        with pytest.raises(InvalidInput, match="/root/walk holds values that are no numbers"):
-            host.read_pose("/root/bones")
+        with pytest.raises(InvalidInput, match="/figure/walk holds values that are no numbers"):
+            host.read_pose("/figure/bones")
     else:
-        assert np.isfinite(host.read_pose("/root/bones").local).all()
+        assert np.isfinite(host.read_pose("/figure/bones").local).all()
 
 
 @pytest.mark.parametrize("frame", [np.nan, np.inf, -np.inf])
 def test_frames_that_are_no_numbers_are_refused(frame: float, tmp_path: Path) -> None:
     """USD takes NaN for its default time, and a key there would be no key at all."""
     host = UsdHost(written(tmp_path / "good.usda", skinned(JOINTS, SKIN)))
-    pose, before = host.read_pose("/root/bones"), host.layer.ExportToString()
+    pose, before = host.read_pose("/figure/bones"), host.layer.ExportToString()
     for call in (host.placement, host.read_pose, lambda key, frame: host.write_pose(key, pose, frame)):
         with pytest.raises(InvalidInput, match="a frame is a number"):
-            call("/root/bones", frame)
+            call("/figure/bones", frame)
     with pytest.raises(InvalidInput, match="world_from_surface must be finite"):
         host.add(Asset("ball", meshes.icosphere(1)), np.full((4, 4), frame))
     assert host.layer.ExportToString() == before and not host.undo()

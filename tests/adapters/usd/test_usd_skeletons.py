@@ -74,23 +74,23 @@ def test_bind_pose_geom_bind_and_constant_influences(tmp_path: Path) -> None:
     bind = forward_kinematics(made.parents, bent(made, 3).local)
     path = tmp_path / "bound.usda"
     stage = Usd.Stage.CreateNew(str(path))
-    scenes().write_rig(stage, Sdf.Path("/root"), SceneRig("arm", replace(made, bind_world=bind)))
-    mesh = stage.GetPrimAtPath("/root/arm_skin")
+    scenes().write_rig(stage, Sdf.Path("/figure"), SceneRig("arm", replace(made, bind_world=bind)))
+    mesh = stage.GetPrimAtPath("/figure/arm_skin")
     shift = Gf.Matrix4d(1.0).SetScale(Gf.Vec3d(2.0, 2.0, -2.0)) * Gf.Matrix4d(1.0).SetTranslate((0.5, 0.0, 0.25))
     UsdSkel.BindingAPI(mesh).CreateGeomBindTransformAttr(shift)
-    rigid = UsdGeom.Mesh.Define(stage, "/root/nail")
+    rigid = UsdGeom.Mesh.Define(stage, "/figure/nail")
     rigid.CreatePointsAttr(Vt.Vec3fArray([(0, 2, 0), (1, 2, 0), (0, 3, 0)]))
     rigid.CreateFaceVertexCountsAttr([3])
     rigid.CreateFaceVertexIndicesAttr([0, 1, 2])
     binding = UsdSkel.BindingAPI.Apply(rigid.GetPrim())
-    binding.CreateSkeletonRel().SetTargets(["/root/arm"])
+    binding.CreateSkeletonRel().SetTargets(["/figure/arm"])
     binding.CreateJointIndicesPrimvar(True, 1).Set([2])
     binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
     stage.GetRootLayer().Save()
     host = UsdHost(path)
-    asset = host.read_rig("/root/arm")
-    assert [part["prim"] for part in asset.details["parts"]] == ["/root/arm_skin", "/root/nail"]
-    assert max(skin_difference(host, "/root/arm", bent(made, seed)) for seed in range(3)) < 1e-5
+    asset = host.read_rig("/figure/arm")
+    assert [part["prim"] for part in asset.details["parts"]] == ["/figure/arm_skin", "/figure/nail"]
+    assert max(skin_difference(host, "/figure/arm", bent(made, seed)) for seed in range(3)) < 1e-5
 
 
 def test_loose_weights_are_normalised_and_told(source: Path) -> None:

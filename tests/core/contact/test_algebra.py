@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contact_core.arrays import FloatArray
-from contact_core.contact.axis import draw_axis, reconstruct_axis, root_from_point
+from contact_core.contact.axis import draw_axis, parameterize_axis, reconstruct_axis, root_from_point
 from contact_core.contact.linkage import follow_link, link_to
-from contact_core.contact.patch import parameterize_patch, points_from_axis, reconstruct_patch
+from contact_core.contact.patch import parameterize_patch, points_from_axis, reconstruct_patch, transfer_patch
 from contact_core.contact.placement import Root
 from contact_core.contact.shape import PatchShape
 from contact_core.contact.transfer import transported
@@ -358,3 +358,20 @@ def test_mistakes_are_answered_in_words() -> None:
         parameterize_patch(two, axis, apart)
     with pytest.raises(InvalidInput, match="no path"):
         transported(two, axis.root(), apart[1])
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_papers_operations_by_name_agree_with_their_parts(family: str) -> None:
+    """An axis taken apart is put together again (Algorithms 1 and 3); transfer (5) is a patch's mirror image."""
+    mesh, target = cached_family(family), meshes.icosphere(3)
+    points = region(mesh, 3)
+    picks = points[-3:]
+    shape, axis = draw_axis(mesh, picks, dense=False)
+    whole = reconstruct_axis(mesh, parameterize_axis(mesh, picks), axis.root())
+    away = whole.points.positions(mesh)[:, None] - picks.positions(mesh)  # (m, 3, 3): saddles may lie between
+    bound = 1e-5 if family == "sliver" else 1e-9
+    assert np.linalg.norm(away, axis=2).min(axis=0).max() <= bound * mesh.bounding_box_diagonal
+    there = Root.at(SurfacePoints([5], [[0.2, 0.3, 0.5]]), 1.0 + 0j)
+    patch = PatchShape(shape, parameterize_patch(mesh, axis, points), np.ones(len(points)))
+    placed = transfer_patch(mesh, axis, shape, points, target, there)
+    assert off(target, placed.points, reconstruct_patch(target, patch, there, mirrored=True).points) <= 1e-12
