@@ -27,8 +27,8 @@ from contact_core.geometry import SurfacePoints, TriangleMesh, exact_geodesic
 from contact_core.geometry.raycast import Locator
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, FORMATS, RENDERERS, SAMPLES
-from contact_core.plugins.slots import Picture, PictureMesh
-from contact_core.pose.bones import bones_of
+from contact_core.rig.bones import bones_of
+from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.session import Session
 
 HERE = Path(__file__).parent

@@ -36,7 +36,7 @@ from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_chains
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import RENDERERS
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing import meshes
 
 POLE_RADIUS = 0.25

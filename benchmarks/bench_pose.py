@@ -22,13 +22,13 @@ from harness import record
 from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_builtins.solvers.stepwise import MultiStartSolver
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose
-from contact_core.pose.rotations import exponential
-from contact_core.pose.solver import Iteration, SolveOptions
-from contact_core.pose.threads import one_blas_thread
+from contact_core.rig.rig import Pose
+from contact_core.rig.rotations import exponential
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import Iteration, SolveOptions
+from contact_core.solve.threads import one_blas_thread
 from contact_core.testing import rigs
 
 

@@ -20,8 +20,8 @@ from contact_builtins.solvers.stepwise import MultiStartSolver, random_start
 from contact_core.arrays import FloatArray
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_SOLVERS
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolver, SolveOptions
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolver, SolveOptions
 
 KEPT = Path(__file__).resolve().parent / "grips_best_known.json"
 STARTS = 5  # of every solver but multi-start: the problem's own, and random ones

@@ -15,11 +15,11 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.chart import Chart
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Rig, skin
+from contact_core.rig.chart import Chart
+from contact_core.rig.rig import Rig, skin
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
 from contact_core.testing import rigs
 
 MET = 0.01  # of the manipulator's length

@@ -36,10 +36,10 @@ from contact_core.job.run import prepare
 from contact_core.job.solving import pose_problem
 from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import skin
-from contact_core.pose.solver import PoseSolution, SolveOptions, patch_residuals
+from contact_core.rig.rig import skin
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, SolveOptions, patch_residuals
 
 HERE = Path(__file__).resolve().parent
 GRIPS = ("baseball", "pole", "mug")  # of benchmarks/grips and of `contact demo`

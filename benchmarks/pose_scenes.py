@@ -17,11 +17,11 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.penetration import PenetrationTerm
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose, Rig
-from contact_core.pose.terms import paper_terms
+from contact_core.rig.rig import Pose, Rig
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.penetration import PenetrationTerm
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.terms import paper_terms
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,14 +24,14 @@ from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.job.solving import pose_problem
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.slots import Picture, PictureMesh
-from contact_core.pose.body import PairedPoints
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.poses import blend
-from contact_core.pose.problem import Limits, PoseProblem
-from contact_core.pose.rig import skin
-from contact_core.pose.solver import PoseSolution, PoseSolver, SolveOptions, patch_residuals, posed_mesh
-from contact_core.pose.terms import DistanceTerm, PriorTerm, paper_terms
+from contact_core.rig.poses import blend
+from contact_core.rig.rig import skin
+from contact_core.scene.picture import Picture, PictureMesh
+from contact_core.solve.body import PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import Limits, PoseProblem
+from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, patch_residuals, posed_mesh
+from contact_core.solve.terms import DistanceTerm, PriorTerm, paper_terms
 from contact_viewer.renderer import PyVistaRenderer
 
 REPOSITORY = Path(__file__).resolve().parents[1]

@@ -25,8 +25,8 @@ from contact_core.proposals.verbs import ProposalVerbs
 
 if TYPE_CHECKING:
     from contact_core.geometry.engine import GeodesicEngine
-    from contact_core.host_link import HostLink
     from contact_core.proposals.proposal import Proposal
+    from contact_core.scene.link import HostLink
 
 log = logging.getLogger(__name__)
 
@@ -68,7 +68,7 @@ class Session(PluginVerbs, ProposalVerbs):
         self.host = host
         self._host_link: HostLink | None = None
         if host is not None:
-            from contact_core.host_link import HostLink
+            from contact_core.scene.link import HostLink
 
             link = HostLink(self, host)
             if document is None:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from contact_core.arrays import IntArray
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

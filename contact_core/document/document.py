@@ -18,7 +18,7 @@ from contact_core.contact.placement import Link, Placement
 from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.errors import CommandRejected, InvalidInput
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 Color = tuple[float, float, float]
 MAX_NAME = 200

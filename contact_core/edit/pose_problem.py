@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from contact_core.edit.verbs.organising import PairGeometry
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.problem import Limits, PoseProblem
-from contact_core.pose.terms import PoseTerm, paper_terms
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.problem import Limits, PoseProblem
+from contact_core.solve.terms import PoseTerm, paper_terms
 
 
 def surfaces_of(pairs: Sequence[PairGeometry]) -> list[str]:

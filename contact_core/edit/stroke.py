@@ -9,7 +9,7 @@ from contact_core.edit.command import Command, apply_command
 from contact_core.edit.derived import Derived
 from contact_core.edit.verbs import Verbs
 from contact_core.errors import CommandRejected
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 
 
 class Stroke(Verbs):

@@ -16,8 +16,8 @@ from contact_core.job.report import DEFINITIONS, SCHEMA, table
 from contact_core.job.workpiece import Job, JobResult
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS, RENDERERS
-from contact_core.plugins.slots import Picture
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.picture import Picture
 from contact_core.whole_file import write_whole
 from contact_core.whole_set import replacing_together
 

@@ -19,8 +19,8 @@ from contact_core.geometry.tracing import trace_geodesic
 from contact_core.job.recipe import DiskSpec, PatchSpec, PointSpec, RootSpec
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import AXIS_GENERATORS
-from contact_core.pose.bones import bones_of
-from contact_core.pose.rig import Rig
+from contact_core.rig.bones import bones_of
+from contact_core.rig.rig import Rig
 
 _UPRIGHT = 0.05  # sine of the angle to the normal below which a direction tells no heading
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))

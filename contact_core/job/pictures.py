@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from contact_core.arrays import FloatArray
 from contact_core.job.scene import moved, posed_skin
 from contact_core.job.workpiece import Job
-from contact_core.plugins.slots import Picture, PictureMesh
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.picture import Picture, PictureMesh
 
 SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 LINES_PER_PATCH = 14

@@ -29,8 +29,8 @@ from contact_core.job.workpiece import HAND, OBJECT, Job, JobProgress, JobResult
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import PLACERS
 from contact_core.plugins.slots import PlacementRequest, PlacementResult
-from contact_core.pose.bones import bone_segments
-from contact_core.pose.rig import Pose
+from contact_core.rig.bones import bone_segments
+from contact_core.rig.rig import Pose
 from contact_core.session import Session
 from contact_core.whole_set import check_writable
 

@@ -14,8 +14,8 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.job.recipe import CoarseSpec
-from contact_core.pose.chart import Chart
-from contact_core.pose.rig import Pose, Rig, forward_kinematics, skin
+from contact_core.rig.chart import Chart
+from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
 
 
 def world_from_object(spec: CoarseSpec, mesh: TriangleMesh) -> FloatArray:

@@ -8,13 +8,13 @@ from contact_core.job.workpiece import HAND, OBJECT, Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_TERMS
 from contact_core.plugins.solving import solve_by_plugin
-from contact_core.pose.body import Body
-from contact_core.pose.problem import Limits, PoseProblem
-from contact_core.pose.rig import Pose
-from contact_core.pose.solver import Iteration, PoseSolution, Progress, SolveOptions, SolveStatus
-from contact_core.pose.terms import PoseTerm, paper_terms
 from contact_core.proposals.draft import Draft
 from contact_core.proposals.proposal import AGAIN, Proposal, ProposalSettings, settle, slide
+from contact_core.rig.rig import Pose
+from contact_core.solve.body import Body
+from contact_core.solve.problem import Limits, PoseProblem
+from contact_core.solve.solver import Iteration, PoseSolution, Progress, SolveOptions, SolveStatus
+from contact_core.solve.terms import PoseTerm, paper_terms
 
 
 def solve(job: Job, plugins: PluginManager) -> None:

@@ -17,10 +17,10 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.job.recipe import Recipe
 from contact_core.job.report import Verdict
 from contact_core.plugins.slots import PlacementResult
-from contact_core.pose.body import manipulator_length
-from contact_core.pose.rig import Pose, Rig
-from contact_core.pose.solver import PoseSolution
+from contact_core.rig.rig import Pose, Rig
 from contact_core.session import Session
+from contact_core.solve.body import manipulator_length
+from contact_core.solve.solver import PoseSolution
 
 # Called with a fraction 0..1 and a text; False cancels the job.
 JobProgress = Callable[[float, str], bool | None]

@@ -15,8 +15,8 @@ import pluggy
 
 if TYPE_CHECKING:
     from contact_core.document.document import ContactDocument
-    from contact_core.pose.problem import PoseProblem
-    from contact_core.pose.solver import PoseSolution
+    from contact_core.solve.problem import PoseProblem
+    from contact_core.solve.solver import PoseSolution
 
 API_VERSION = (1, 0)  # a plugin may set CONTACT_API = ">=1.0,<2"; the major number grows when a hook breaks
 Offers: TypeAlias = Iterable[object]
@@ -35,16 +35,16 @@ def contact_placers() -> Offers:
     """Ways to choose where patches go on the object: `plugins.slots.Placer`."""
 @hookspec
 def contact_pose_solvers() -> Offers:
-    """Optimisers of a pose problem: `pose.solver.PoseSolver`."""
+    """Optimisers of a pose problem: `solve.solver.PoseSolver`."""
 @hookspec
 def contact_pose_terms() -> Offers:
-    """Terms of the pose objective: `pose.terms.PoseTerm`."""
+    """Terms of the pose objective: `solve.terms.PoseTerm`."""
 @hookspec
 def contact_geodesic_engines() -> Offers:
     """Engines for distances, log maps and traces: `geometry.engine.GeodesicEngine`."""
 @hookspec
 def contact_hosts() -> Offers:
-    """Hosts: DCCs, stages, viewers: `host.HostAdapter` (classes; a host is opened by its own constructor)."""
+    """Hosts: DCCs, stages, viewers: `scene.host.HostAdapter` (classes; a host is opened by its own constructor)."""
 @hookspec
 def contact_formats() -> Offers:
     """File formats: `plugins.slots.Format`."""

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from contact_core.contact.brush import Brush
     from contact_core.edit.command import Command
     from contact_core.geometry.engine import GeodesicEngine
-    from contact_core.host import HostAdapter
     from contact_core.plugins.slots import CliCommand, Format, Placer, Renderer, Sample
-    from contact_core.pose.solver import PoseSolver
-    from contact_core.pose.terms import PoseTerm
+    from contact_core.scene.host import HostAdapter
+    from contact_core.solve.solver import PoseSolver
+    from contact_core.solve.terms import PoseTerm
 
 T_co = TypeVar("T_co", covariant=True)
 
@@ -43,12 +43,14 @@ AXIS_GENERATORS: Slot[AxisGenerator] = Slot(
     "contact_axis_generators", "axis generator", "contact_core.contact.axis_generator:AxisGenerator"
 )
 PLACERS: Slot[Placer] = Slot("contact_placers", "placer", "contact_core.plugins.slots:Placer")
-POSE_SOLVERS: Slot[PoseSolver] = Slot("contact_pose_solvers", "pose solver", "contact_core.pose.solver:PoseSolver")
-POSE_TERMS: Slot[PoseTerm] = Slot("contact_pose_terms", "pose term", "contact_core.pose.terms:PoseTerm")
+POSE_SOLVERS: Slot[PoseSolver] = Slot("contact_pose_solvers", "pose solver", "contact_core.solve.solver:PoseSolver")
+POSE_TERMS: Slot[PoseTerm] = Slot("contact_pose_terms", "pose term", "contact_core.solve.terms:PoseTerm")
 GEODESIC_ENGINES: Slot[GeodesicEngine] = Slot(
     "contact_geodesic_engines", "geodesic engine", "contact_core.geometry.engine:GeodesicEngine"
 )
-HOSTS: Slot[type[HostAdapter]] = Slot("contact_hosts", "host", "contact_core.host:HostAdapter", instances=False)
+HOSTS: Slot[type[HostAdapter]] = Slot(
+    "contact_hosts", "host", "contact_core.scene.host:HostAdapter", instances=False
+)
 FORMATS: Slot[Format] = Slot("contact_formats", "format", "contact_core.plugins.slots:Format")
 RENDERERS: Slot[Renderer] = Slot("contact_renderers", "renderer", "contact_core.plugins.slots:Renderer")
 SAMPLES: Slot[Sample] = Slot("contact_samples", "sample", "contact_core.plugins.slots:Sample")

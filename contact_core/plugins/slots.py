@@ -1,8 +1,8 @@
 """The plugin slots that belong to no lower floor: formats, samples, renderers, placers, sub-commands.
 
 The protocols of the other slots live with what they serve: `contact.brush.Brush`,
-`contact.axis_generator.AxisGenerator`, `pose.terms.PoseTerm`, `pose.solver.PoseSolver`,
-`geometry.engine.GeodesicEngine`, `host.HostAdapter`.
+`contact.axis_generator.AxisGenerator`, `solve.terms.PoseTerm`, `solve.solver.PoseSolver`,
+`geometry.engine.GeodesicEngine`, `scene.host.HostAdapter`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ if TYPE_CHECKING:  # so that `contact --help`, which asks for sub-commands, load
     from contact_core.document.asset import Asset
     from contact_core.geometry.mesh import TriangleMesh
     from contact_core.geometry.surface_point import SurfacePoints
-    from contact_core.pose.rig import Pose, Rig
+    from contact_core.rig.rig import Pose, Rig
+    from contact_core.scene.picture import Picture
 
 
 @runtime_checkable
@@ -51,34 +52,6 @@ class Sample(Protocol):
     def build(self) -> Asset:
         """Deterministic; in seconds."""
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class PictureMesh:
-    """One mesh of a picture. color: RGB 0..1; opacity 0..1; vertex_colors (n, 3) override color."""
-
-    mesh: TriangleMesh
-    color: tuple[float, float, float]
-    opacity: float = 1.0
-    vertex_colors: FloatArray | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """All that a renderer needs, in world space: meshes, coloured points, line segments, camera, caption.
-
-    focus: (k, 3) what has to be in the frame; all meshes by default. table and legend stand above the scene.
-    """
-
-    meshes: tuple[PictureMesh, ...]
-    points: tuple[tuple[FloatArray, tuple[float, float, float]], ...] = ()  # (k, 3) positions, colour
-    lines: tuple[tuple[FloatArray, tuple[float, float, float]], ...] = ()  # (k, 2, 3) segments, colour
-    camera_from: tuple[float, float, float] | None = None  # direction from the centre to the eye
-    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    caption: str = ""
-    table: tuple[tuple[str, str, bool], ...] = ()  # name, value, failed
-    focus: FloatArray | None = None
-    legend: tuple[tuple[str, tuple[float, float, float]], ...] = ()  # name, colour
 
 
 @runtime_checkable

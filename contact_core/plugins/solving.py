@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_SOLVERS
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, Progress, SolveOptions
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, Progress, SolveOptions
 
 
 def solve_by_plugin(

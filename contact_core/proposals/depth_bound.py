@@ -9,10 +9,10 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.geometry.inside import Sunk
-from contact_core.pose.penetration import Allowance, NoDeeperTerm, Solid, Solids, solids_of
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import posed_mesh
-from contact_core.pose.state import PoseState
+from contact_core.solve.penetration import Allowance, NoDeeperTerm, Solid, Solids, solids_of
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import posed_mesh
+from contact_core.solve.state import PoseState
 
 REACH = 2.5  # in l: vertices that start farther outside are not watched until they get inside
 MARGIN = 0.005  # in l, a twentieth of a millimetre on a hand: how far on the safe side vertices have to stay

@@ -11,10 +11,10 @@ from contact_core.edit.commands import Settle
 from contact_core.edit.derived import Derived
 from contact_core.edit.pose_problem import pose_problem, surfaces_of
 from contact_core.edit.verbs import Verbs
-from contact_core.pose.body import Body
-from contact_core.pose.problem import Limits, PoseProblem
-from contact_core.pose.rig import Pose, Rig
-from contact_core.pose.terms import PoseTerm, paper_terms
+from contact_core.rig.rig import Pose, Rig
+from contact_core.solve.body import Body
+from contact_core.solve.problem import Limits, PoseProblem
+from contact_core.solve.terms import PoseTerm, paper_terms
 
 
 class Draft(Verbs):

@@ -17,16 +17,16 @@ from contact_core.errors import Cancelled, InvalidInput
 from contact_core.plugins.registry import PLACERS, POSE_SOLVERS
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.plugins.solving import PluginSolver
-from contact_core.pose.body import uniform_scale
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.penetration import Solids
-from contact_core.pose.problem import Limits, PoseProblem
-from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
-from contact_core.pose.terms import PoseTerm, paper_terms
 from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 from contact_core.proposals.draft import Draft, change
 from contact_core.proposals.sliding import solve_sliding
 from contact_core.proposals.sliding_targets import SlidingPatch
+from contact_core.solve.body import uniform_scale
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.penetration import Solids
+from contact_core.solve.problem import Limits, PoseProblem
+from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.solve.terms import PoseTerm, paper_terms
 
 if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager

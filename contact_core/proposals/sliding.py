@@ -14,12 +14,12 @@ import numpy as np
 
 from contact_core.contact.placement import Root
 from contact_core.errors import InvalidInput
-from contact_core.pose.body import Body
-from contact_core.pose.penetration import Solids
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
 from contact_core.proposals.depth_bound import DepthBound, measured
 from contact_core.proposals.sliding_targets import SlidingPatch, SlidingTargets
+from contact_core.solve.body import Body
+from contact_core.solve.penetration import Solids
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
 
 SLIDING = ".sliding"  # what the body of the sliding patches of a surface is called: its name and this
 ITERATIONS = 20  # at most in a round: the pose is nearly there, and what comes later gains a few hundredths

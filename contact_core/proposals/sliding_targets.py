@@ -23,7 +23,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import heading_to_direction
 from contact_core.geometry.tracing import trace_geodesic
-from contact_core.pose.black_box import BlackBoxDof, Evaluate
+from contact_core.solve.black_box import BlackBoxDof, Evaluate
 
 DIRECTIONS = ("along", "across")  # of the first heading
 

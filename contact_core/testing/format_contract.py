@@ -14,7 +14,7 @@ import pytest
 from contact_core.document.asset import Asset
 from contact_core.errors import ContactError, FileRefused
 from contact_core.plugins.slots import Format
-from contact_core.pose.rig import JointFreedom, Pose, Rig
+from contact_core.rig.rig import JointFreedom, Pose, Rig
 from contact_core.testing import meshes
 from contact_core.testing.contract import Contract, needs
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, digest
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.host import DocumentStorage, PoseWriting, RigReading
-from contact_core.plugins.slots import Picture, PictureMesh
-from contact_core.pose.rig import Pose, Rig
+from contact_core.rig.rig import Pose, Rig
+from contact_core.scene.host import DocumentStorage, PoseWriting, RigReading
+from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing.host_scenes import HostScene
 
 ACCURACY = 1e-5  # of a size: what single precision leaves after a few matrix products

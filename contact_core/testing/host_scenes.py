@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.host import SceneSpace
-from contact_core.pose.rig import JointFreedom, Pose, Rig, forward_kinematics
+from contact_core.rig.rig import JointFreedom, Pose, Rig, forward_kinematics
+from contact_core.scene.host import SceneSpace
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from contact_core.edit import commands as kinds
 from contact_core.edit.command import Command
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 from contact_core.testing.random_values import (
     Rng,
     moved_placement,

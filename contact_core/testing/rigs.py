@@ -9,11 +9,11 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.body import Body, PairedPoints, manipulator_length
-from contact_core.pose.chart import Chart
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import JointFreedom, Pose, Rig, skin
-from contact_core.pose.rotations import exponential
+from contact_core.rig.chart import Chart
+from contact_core.rig.rig import JointFreedom, Pose, Rig, skin
+from contact_core.rig.rotations import exponential
+from contact_core.solve.body import Body, PairedPoints, manipulator_length
+from contact_core.solve.problem import PoseProblem
 from contact_core.testing.meshes import grid_faces
 
 Freedom = Callable[[int], JointFreedom]

@@ -11,12 +11,12 @@ import pytest
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import Iteration, PoseSolver, SolveOptions, SolveStatus
-from contact_core.pose.state import PoseState
-from contact_core.pose.terms import BoundTerm, DistanceTerm, paper_terms
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import Iteration, PoseSolver, SolveOptions, SolveStatus
+from contact_core.solve.state import PoseState
+from contact_core.solve.terms import BoundTerm, DistanceTerm, paper_terms
 from contact_core.testing import rigs
 from contact_core.testing.contract import Contract, needs
 

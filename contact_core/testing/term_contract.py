@@ -9,10 +9,10 @@ import pytest
 
 from contact_core.arrays import FloatArray
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose, Rig
-from contact_core.pose.terms import PoseTerm
+from contact_core.rig.rig import Pose, Rig
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.terms import PoseTerm
 from contact_core.testing import meshes, rigs
 from contact_core.testing.contract import Contract, needs
 

@@ -44,7 +44,7 @@ def contact_placers() -> list[object]:
 @hookimpl
 def contact_pose_solvers() -> list[object]:
     return [
-        "contact_core.pose.levenberg_marquardt:LevenbergMarquardt",
+        "contact_core.solve.levenberg_marquardt:LevenbergMarquardt",
         "contact_builtins.solvers.nlopt_solver:NLoptSolver",
         "contact_builtins.solvers.stepwise:StagedSolver",
         "contact_builtins.solvers.stepwise:ProgressiveSolver",
@@ -55,10 +55,10 @@ def contact_pose_solvers() -> list[object]:
 @hookimpl
 def contact_pose_terms() -> list[object]:
     return [
-        "contact_core.pose.terms:DistanceTerm",
-        "contact_core.pose.terms:NormalTerm",
-        "contact_core.pose.terms:PriorTerm",
-        "contact_core.pose.penetration:PenetrationTerm",
+        "contact_core.solve.terms:DistanceTerm",
+        "contact_core.solve.terms:NormalTerm",
+        "contact_core.solve.terms:PriorTerm",
+        "contact_core.solve.penetration:PenetrationTerm",
         "contact_builtins.terms.self_collision:SelfCollisionTerm",
         "contact_builtins.terms.aims:PinTerm",
         "contact_builtins.terms.aims:LookTerm",
@@ -75,7 +75,7 @@ def contact_geodesic_engines() -> list[object]:
 
 @hookimpl
 def contact_hosts() -> list[object]:
-    return ["contact_core.memory_host:MemoryHost"]
+    return ["contact_core.scene.memory_host:MemoryHost"]
 
 
 @hookimpl

@@ -19,8 +19,8 @@ import numpy as np
 from parity_script import FRAME, Outcome, build_scene, prepared, run
 
 from contact_core.document.asset import Asset
-from contact_core.memory_host import MemoryHost
-from contact_core.pose.rig import forward_kinematics, skin
+from contact_core.rig.rig import forward_kinematics, skin
+from contact_core.scene.memory_host import MemoryHost
 
 
 def put_away(asset: Asset, path: Path) -> None:

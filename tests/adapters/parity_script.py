@@ -20,12 +20,12 @@ from contact_core.document.schema import document_to_json
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose, Rig
-from contact_core.pose.solver import SolveOptions
+from contact_core.rig.rig import Pose, Rig
 from contact_core.session import Session
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import SolveOptions
 
 FRAME = 12.0
 PATCH_POINTS = 24

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contact_core.memory_host import MemoryHost
-from contact_core.scene_reading import turn_up
+from contact_core.scene.memory_host import MemoryHost
+from contact_core.scene.reading import turn_up
 
 HERE = Path(__file__).parent
 JOINTS = {  # joint whose patch goes to the ball, and where the rig comes from

@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 from contact_core.document.asset import Asset
-from contact_core.memory_host import MemoryHost
+from contact_core.scene.memory_host import MemoryHost
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 

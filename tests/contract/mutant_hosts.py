@@ -23,9 +23,9 @@ from contact_core.errors import FileRefused
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.placement import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import SceneObject, SceneSpace, StoredDocument
-from contact_core.memory_host import MemoryHost
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.host import SceneObject, SceneSpace, StoredDocument
+from contact_core.scene.memory_host import MemoryHost
 from contact_core.testing.host_contract import Build, HostContract
 from contact_core.testing.host_scenes import HostScene
 from contact_core.testing.mutants import Mutant

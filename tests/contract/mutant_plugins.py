@@ -17,7 +17,7 @@ from contact_core.contact.axis_generator import AxisRequest
 from contact_core.contact.brush import BrushGesture, BrushMark
 from contact_core.document.asset import Asset
 from contact_core.geometry import SurfacePoints
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 from contact_core.testing.axis_generator_contract import AxisGeneratorContract
 from contact_core.testing.brush_contract import BrushContract
 from contact_core.testing.format_contract import FormatContract

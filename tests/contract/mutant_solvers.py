@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
 from contact_core.testing.mutants import Mutant
 from contact_core.testing.solver_contract import SolverContract
 

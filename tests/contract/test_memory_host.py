@@ -7,8 +7,8 @@ import pytest
 
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
-from contact_core.memory_host import MemoryHost
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.memory_host import MemoryHost
 from contact_core.testing.host_contract import Build, HostContract
 from contact_core.testing.host_scenes import HostScene, arm_rig
 

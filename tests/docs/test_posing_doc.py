@@ -9,7 +9,7 @@ from typing import Any
 import contact_builtins
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
-from contact_core.pose.solver import SolveStatus
+from contact_core.solve.solver import SolveStatus
 
 
 def test_the_example_runs(repository: Path) -> None:

@@ -22,7 +22,7 @@ from contact_core.geometry import SurfacePoints
 from contact_core.geometry.raycast import Locator
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import SAMPLES
-from contact_core.pose.bones import bones_of
+from contact_core.rig.bones import bones_of
 from contact_core.testing import meshes
 from contact_core.testing.axis_generator_contract import AxisGeneratorContract, mirrored, patch, scattered
 

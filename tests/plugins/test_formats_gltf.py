@@ -17,7 +17,7 @@ from contact_builtins.formats.gltf_container import open_gltf
 from contact_core.document.asset import Asset
 from contact_core.errors import ContactError, FileRefused
 from contact_core.geometry.report import report
-from contact_core.pose.rig import Pose, forward_kinematics, skin
+from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.testing import meshes
 from contact_core.testing.format_contract import bar, bent
 

@@ -17,7 +17,7 @@ from contact_builtins.formats.sidecar import read_sidecar
 from contact_builtins.samples.skeleton import Bone, bone_frame, limits, rig_of, root
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
-from contact_core.pose.rig import JointFreedom, forward_kinematics, skin
+from contact_core.rig.rig import JointFreedom, forward_kinematics, skin
 from contact_core.testing import meshes
 from contact_core.testing.format_contract import bar
 

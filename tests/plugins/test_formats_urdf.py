@@ -10,7 +10,7 @@ from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
 from contact_core.geometry.report import report
 from contact_core.plugins.slots import Format
-from contact_core.pose.rig import Rig, forward_kinematics, skin
+from contact_core.rig.rig import Rig, forward_kinematics, skin
 from contact_core.testing.format_contract import FormatContract
 
 BOX = '<visual><geometry><box size="0.2 0.2 0.2"/></geometry></visual>'

@@ -24,8 +24,8 @@ from contact_core.job.scene import coarse_pose
 from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.slots import PlacementRequest
-from contact_core.pose.rig import Pose, skin
-from contact_core.pose.rig import forward_kinematics as forward
+from contact_core.rig.rig import Pose, skin
+from contact_core.rig.rig import forward_kinematics as forward
 
 UP = np.array([0.0, 0.0, 1.0])  # the palm of the built-in hands looks along +z
 

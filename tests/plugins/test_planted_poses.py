@@ -13,8 +13,8 @@ import pytest
 from contact_builtins.samples import catalogue
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.testing import rigs
 
 

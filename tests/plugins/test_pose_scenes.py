@@ -12,9 +12,9 @@ import pytest
 
 from contact_builtins.solvers.stepwise import ProgressiveSolver, StagedSolver
 from contact_core.geometry.distance_field import DistanceField
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.rig import skin
-from contact_core.pose.solver import SolveOptions
+from contact_core.rig.rig import skin
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.solver import SolveOptions
 
 
 @pytest.fixture(scope="module")

@@ -16,10 +16,10 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
-from contact_core.pose.rig import Rig
-from contact_core.pose.solver import PoseSolution
 from contact_core.proposals.proposal import Proposal, ProposalSettings
+from contact_core.rig.rig import Rig
 from contact_core.session import DocumentChanged, Session
+from contact_core.solve.solver import PoseSolution
 from contact_core.testing import meshes, rigs
 
 BALL = meshes.icosphere(3, radius=3.0)

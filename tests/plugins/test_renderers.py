@@ -16,8 +16,8 @@ from contact_builtins.renderers.software import OVERSAMPLE, SoftwareRenderer, dr
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
-from contact_core.plugins.camera import LEGEND_AT, LEGEND_ROWS, ROW, camera_of, legend_rows, rows_above
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.camera import LEGEND_AT, LEGEND_ROWS, ROW, camera_of, legend_rows, rows_above
+from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing.meshes import icosphere, torus
 
 SIZE = (96, 72)

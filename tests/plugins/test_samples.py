@@ -15,7 +15,7 @@ from contact_core.document.asset import Asset
 from contact_core.geometry.report import report
 from contact_core.plugins.registry import resolve
 from contact_core.plugins.slots import Sample
-from contact_core.pose.rig import Rig, forward_kinematics, skin
+from contact_core.rig.rig import Rig, forward_kinematics, skin
 
 BY_NAME = {sample.name: sample for sample in ALL}
 GENUS = {"mug": 1, "scissors": 2, "chair": 7}  # all others: 0

@@ -18,16 +18,16 @@ from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import perform
 from contact_core.plugins.manager import PluginManager
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.penetration import Allowance, NoDeeperTerm
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import skin
-from contact_core.pose.solver import PoseSolution, PoseSolver, Progress, SolveOptions
-from contact_core.pose.terms import PoseTerm
 from contact_core.proposals.depth_bound import DepthBound, measured
 from contact_core.proposals.draft import Draft
 from contact_core.proposals.proposal import ProposalSettings, slide
+from contact_core.rig.rig import skin
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.penetration import Allowance, NoDeeperTerm
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions
+from contact_core.solve.terms import PoseTerm
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import TermContract
 

@@ -15,12 +15,12 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.black_box import Differentiable
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
 from contact_core.proposals.sliding import sliding_problem, solve_sliding
 from contact_core.proposals.sliding_targets import SlidingPatch, SlidingTargets
+from contact_core.solve.black_box import Differentiable
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import differences
 

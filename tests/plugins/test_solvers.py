@@ -11,8 +11,8 @@ from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_builtins.solvers.stepwise import MultiStartSolver, ProgressiveSolver, StagedSolver
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.solver import PoseSolver, SolveOptions
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.solver import PoseSolver, SolveOptions
 from contact_core.testing.solver_contract import SolverContract
 
 

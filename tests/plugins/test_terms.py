@@ -13,12 +13,12 @@ from contact_builtins.terms.self_collision import SelfCollisionTerm
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.penetration import PenetrationTerm, thinned
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import skin
-from contact_core.pose.terms import DistanceTerm, NormalTerm, PoseTerm, PriorTerm, paper_terms
+from contact_core.rig.rig import skin
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.penetration import PenetrationTerm, thinned
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.terms import DistanceTerm, NormalTerm, PoseTerm, PriorTerm, paper_terms
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import TermContract, scene
 

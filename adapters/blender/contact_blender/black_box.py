@@ -5,9 +5,9 @@
     pose = black_box.pose(solution.poses["hand"])
 
 Every evaluation poses the bones, lets the dependency graph run and takes the pose back: a few milliseconds.
-`contact_core.evaluated_rig.body_of` chooses between this and the analytic rig by comparing skins.
+`contact_core.scene.evaluated_rig.body_of` chooses between this and the analytic rig by comparing skins.
 """
 
-from contact_core.evaluated_rig import EvaluatedRig
+from contact_core.scene.evaluated_rig import EvaluatedRig
 
 __all__ = ["EvaluatedRig"]

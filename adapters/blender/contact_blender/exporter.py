@@ -14,7 +14,7 @@ from contact_blender.rig import REST_BASIS
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 
 _REST_NOISE = 1e-6  # relative to the rig's size: a rest pose this near to the bind pose is the bind pose
 

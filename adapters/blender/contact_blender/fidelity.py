@@ -17,7 +17,7 @@ from contact_blender.freedom import is_plain_limit, limits_of
 from contact_blender.mesh import active_modifiers
 from contact_blender.rig import UNMOVED, RigReading, read_skeleton
 from contact_core.errors import InvalidInput
-from contact_core.pose.rig import forward_kinematics, skin
+from contact_core.rig.rig import forward_kinematics, skin
 
 TOLERANCE = 1e-5  # of the bounding box diagonal
 _HARMLESS = frozenset({"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"})  # no vertex moves

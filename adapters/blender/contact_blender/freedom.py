@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.pose.rig import JointFreedom
+from contact_core.rig.rig import JointFreedom
 
 AXES = "XYZ"
 _KEPT = "contact_freedom"

@@ -21,7 +21,8 @@ from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.placement import Placement, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import (
+from contact_core.rig.rig import Pose
+from contact_core.scene.host import (
     Display,
     DocumentStorage,
     PoseWriting,
@@ -36,9 +37,8 @@ from contact_core.host import (
     Undo,
     check_frame,
 )
-from contact_core.plugins.slots import Picture
-from contact_core.pose.rig import Pose
-from contact_core.scene_reading import fit_to_scene, stretch_pose, stretch_rig, surface_of_polygons, unstretch_pose
+from contact_core.scene.picture import Picture
+from contact_core.scene.reading import fit_to_scene, stretch_pose, stretch_rig, surface_of_polygons, unstretch_pose
 
 if TYPE_CHECKING:
     from contact_blender.overlay import Overlay

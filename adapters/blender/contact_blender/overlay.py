@@ -9,7 +9,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.picture import Picture, PictureMesh
 
 _POINT_SIZE, _LINE_WIDTH = 7.0, 2.5  # pixels
 

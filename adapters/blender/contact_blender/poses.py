@@ -14,7 +14,7 @@ from contact_blender.evaluation import graph_at
 from contact_blender.rig import UNMOVED, Skeleton, read_skeleton
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 
 def read_pose(armature: Any, frame: float | None, unmoved: bool) -> Pose:

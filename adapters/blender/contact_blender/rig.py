@@ -1,11 +1,11 @@
 """Blender's armatures as analytic rigs: bones, rest, vertex groups, in the armature's own space.
 
-What Blender's Armature modifier does there, and `contact_core.pose.rig.skin` as well:
+What Blender's Armature modifier does there, and `contact_core.rig.rig.skin` as well:
 
     x' = sum over deforming bones b of w_b P_b B_b^-1 x / sum of w_b        (x itself where the sum is below 1e-4)
 
 with P_b and B_b the posed and the rest matrix of a bone, x the vertex before the modifier. The scale of the
-armature object comes in afterwards, by `scene_reading.stretch_rig`, as for every host.
+armature object comes in afterwards, by `scene.reading.stretch_rig`, as for every host.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.triangulate import triangulate
 from contact_core.geometry.weld import weld
-from contact_core.pose.rig import JointFreedom, Rig, forward_kinematics
+from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics
 
 UNMOVED = "(unmoved)"  # the joint of vertices that no bone moves
 REST_BASIS = "contact_rest_basis"  # on a pose bone: the rest pose as an offset from the armature's own rest

@@ -12,7 +12,7 @@ from typing import Any
 
 from contact_blender.ids import ObjectIds
 from contact_core.errors import FileRefused
-from contact_core.host import StoredDocument, check_overwrite
+from contact_core.scene.host import StoredDocument, check_overwrite
 
 KEY = "contact_core"
 

@@ -125,9 +125,9 @@ def _inspection_text(facts: dict[str, Any]) -> str:
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    from contact_core.host import SceneSpace
     from contact_core.job.assets import read_file
     from contact_core.plugins.registry import SAMPLES
+    from contact_core.scene.host import SceneSpace
     from contact_usd.host import UsdHost
 
     assets = [

@@ -10,7 +10,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 from contact_usd.freedoms import FREEDOMS, freedom_to_json
 from contact_usd.mesh import gf_matrix
 

@@ -11,7 +11,7 @@ import numpy as np
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 if TYPE_CHECKING:
     from contact_usd.host import UsdHost
@@ -65,7 +65,7 @@ def _host(path: Path | None, meters_per_unit: float = 1.0, up_axis: str = "Y") -
         from contact_usd.host import UsdHost
     except ImportError as error:
         raise MissingExtra("Reading and writing USD", "usd") from error
-    from contact_core.host import SceneSpace
+    from contact_core.scene.host import SceneSpace
 
     if path is not None:
         return UsdHost(path)

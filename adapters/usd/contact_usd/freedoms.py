@@ -10,7 +10,7 @@ from pxr import Usd
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.rig import JointFreedom
+from contact_core.rig.rig import JointFreedom
 
 FREEDOMS = "contact:jointFreedoms"
 

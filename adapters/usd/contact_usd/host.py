@@ -14,7 +14,8 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput, MissingExtra
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import (
+from contact_core.rig.rig import Pose
+from contact_core.scene.host import (
     DocumentStorage,
     PoseWriting,
     RigReading,
@@ -28,8 +29,7 @@ from contact_core.host import (
     check_frame,
     check_overwrite,
 )
-from contact_core.pose.rig import Pose
-from contact_core.scene_reading import fit_to_scene, stretch_pose, unstretch_pose
+from contact_core.scene.reading import fit_to_scene, stretch_pose, unstretch_pose
 
 try:
     from pxr import Sdf, Tf, Usd, UsdGeom, UsdSkel

@@ -12,8 +12,8 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.placement import Placement, split_world_from_local
-from contact_core.host import SceneSpace
-from contact_core.scene_reading import surface_of_polygons
+from contact_core.scene.host import SceneSpace
+from contact_core.scene.reading import surface_of_polygons
 from contact_usd.stage_io import reason
 
 AS_IT_STANDS = Usd.TimeCode.EarliestTime()  # a default value, or the first sample where there are only samples

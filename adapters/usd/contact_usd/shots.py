@@ -13,11 +13,11 @@ from contact_core.document.asset import Asset
 from contact_core.document.document import ContactDocument, Surface
 from contact_core.edit.pose_problem import pose_problem
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.pose.body import Body
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.sequence import SequenceSolution, solve_sequence
-from contact_core.pose.solver import PoseSolver
 from contact_core.session import Session
+from contact_core.solve.body import Body
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.sequence import SequenceSolution, solve_sequence
+from contact_core.solve.solver import PoseSolver
 from contact_usd import contacts
 from contact_usd.host import UsdHost
 from contact_usd.stage_io import SUFFIXES

@@ -17,9 +17,9 @@ from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.triangulate import triangulate
 from contact_core.geometry.weld import weld
-from contact_core.host import SceneSpace
-from contact_core.pose.rig import Rig
-from contact_core.scene_reading import stretch_rig
+from contact_core.rig.rig import Rig
+from contact_core.scene.host import SceneSpace
+from contact_core.scene.reading import stretch_rig
 from contact_usd.freedoms import read_freedoms
 from contact_usd.mesh import AS_IT_STANDS, matrix_of, placement_of, read_arrays
 

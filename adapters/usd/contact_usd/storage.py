@@ -8,7 +8,7 @@ from typing import Any
 from pxr import Sdf, Usd
 
 from contact_core.errors import FileRefused
-from contact_core.host import StoredDocument
+from contact_core.scene.host import StoredDocument
 
 ROOT = Sdf.Path("/Contacts")
 SCHEMA = "ContactDocumentAPI"

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.plugins.camera import LEGEND_AT, ROW, WIDEST_NAME, camera_of, legend_rows
-from contact_core.plugins.slots import Picture
+from contact_core.scene.camera import LEGEND_AT, ROW, WIDEST_NAME, camera_of, legend_rows
+from contact_core.scene.picture import Picture
 from contact_viewer.scene_file import read_scene
 
 OVERSAMPLE = 2

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 
 from contact_core.errors import FileRefused, MissingExtra
-from contact_core.plugins.slots import Picture
+from contact_core.scene.picture import Picture
 from contact_core.whole_file import replacing
 from contact_viewer.scene_file import write_scene
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.picture import Picture, PictureMesh
 
 
 def write_scene(path: Path, pictures: Sequence[Picture], size: tuple[int, int]) -> None:

@@ -13,7 +13,7 @@ from contact_core.edit.command import BaseCommand, Command, register_command
 from contact_core.edit.commands.checks import NamedPlacements, add_patches, check_placement
 from contact_core.edit.commands.surfaces import SetPose
 from contact_core.errors import CommandRejected
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 
 @dataclass(frozen=True, eq=False)

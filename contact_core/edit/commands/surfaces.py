@@ -14,7 +14,7 @@ from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.command import BaseCommand, Command, register_command
 from contact_core.edit.commands.checks import NamedPlacements, check_free, check_links, place_all
 from contact_core.errors import CommandRejected
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 
 @register_command

@@ -20,7 +20,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
-from contact_core.pose.rig import Rig, forward_kinematics, skin
+from contact_core.rig.rig import Rig, forward_kinematics, skin
 
 
 @dataclass(frozen=True, eq=False)

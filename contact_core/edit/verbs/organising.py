@@ -28,7 +28,7 @@ from contact_core.edit.commands import (
 from contact_core.edit.verbs.editor import Editor
 from contact_core.errors import CommandRejected
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,8 @@ from contact_core.edit.verbs.rebinding import RebindReport, plan_rebind
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.bones import bones_of
-from contact_core.pose.rig import Rig
+from contact_core.rig.bones import bones_of
+from contact_core.rig.rig import Rig
 
 
 class SurfaceVerbs(Editor):

@@ -9,7 +9,7 @@ import pytest
 
 from contact_core.document.schema import VERSION
 from contact_core.errors import FileRefused
-from contact_core.host import StoredDocument
+from contact_core.scene.host import StoredDocument
 from contact_core.testing.contract import needs
 from contact_core.testing.host_checks import ACCURACY, object_id, pose_error, surfaces_of
 from contact_core.testing.host_clauses.ground import HostGround

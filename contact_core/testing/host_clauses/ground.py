@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import pytest
 
 from contact_core.document.schema import VERSION
-from contact_core.host import SceneSpace, StoredDocument
+from contact_core.scene.host import SceneSpace, StoredDocument
 from contact_core.testing.host_checks import object_id, readable_state
 from contact_core.testing.host_scenes import HostScene, bent, contract_scene
 

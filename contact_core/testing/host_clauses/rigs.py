@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.pose.rig import Pose, forward_kinematics, skin
+from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.testing.contract import needs
 from contact_core.testing.host_checks import ACCURACY, dense_weights, is_rigid, object_id, pose_error
 from contact_core.testing.host_clauses.ground import HostGround

@@ -6,7 +6,7 @@ from studio_grip.lbfgsb import LBFGSB
 
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import AXIS_GENERATORS, POSE_SOLVERS
-from contact_core.pose.solver import SolveOptions
+from contact_core.solve.solver import SolveOptions
 from contact_core.testing.axis_generator_contract import AxisGeneratorContract
 from contact_core.testing.solver_contract import SolverContract
 

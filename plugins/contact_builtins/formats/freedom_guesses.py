@@ -13,7 +13,7 @@ import numpy as np
 
 from contact_builtins.formats.joint_names import Side, digit_chains, digit_joint
 from contact_core.arrays import BoolArray, FloatArray, IntArray
-from contact_core.pose.rig import JointFreedom
+from contact_core.rig.rig import JointFreedom
 
 # Degrees: twist, spread, flexion from, flexion to.
 FINGER_LIMITS = {"proximal": (8, 20, -15, 95), "intermediate": (4, 2, -5, 105), "distal": (4, 2, -8, 80)}

@@ -16,7 +16,7 @@ from contact_builtins.formats.sidecar import read_sidecar, sidecar_beside
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 
 class GltfFiles:

@@ -19,7 +19,7 @@ from contact_builtins.formats.sidecar import Sidecar
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.pose.rig import JointFreedom, Rig
+from contact_core.rig.rig import JointFreedom, Rig
 
 MAX_JOINTS = 4096
 SAME = 1e-4  # relative difference up to which two transforms count as one

@@ -16,7 +16,7 @@ from contact_core._version import __version__
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
-from contact_core.pose.rig import Pose, Rig
+from contact_core.rig.rig import Pose, Rig
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 COMPONENT_OF = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}

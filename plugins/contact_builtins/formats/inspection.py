@@ -13,7 +13,7 @@ from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
 from contact_core.geometry.report import report
 from contact_core.plugins.slots import Format
-from contact_core.pose.rig import ROTATION_DOFS, Rig
+from contact_core.rig.rig import ROTATION_DOFS, Rig
 
 OWN_FORMATS = ("gltf:GltfFiles", "mesh_files:MeshFiles", "urdf:UrdfFiles")
 

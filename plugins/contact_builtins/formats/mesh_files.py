@@ -12,7 +12,7 @@ from contact_builtins.formats.refusal import file_bytes, refusing
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 
 PARSERS: dict[str, Callable[[bytes], Polygons]] = {
     ".obj": parse_obj,

@@ -18,7 +18,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import JointFreedom, Rig, forward_kinematics
+from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics
 
 
 class UrdfFiles:

@@ -21,7 +21,7 @@ from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.table import Table
 from contact_core.plugins.slots import PatchPlacement, PlacementRequest, PlacementResult
-from contact_core.pose.body import manipulator_length
+from contact_core.solve.body import manipulator_length
 
 FACING = -0.3  # n.n' of a face that a pad may land on: never the far wall of a cup
 

@@ -11,8 +11,8 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.plugins.slots import PlacementRequest
-from contact_core.pose.chart import Chart
-from contact_core.pose.rig import ROTATION_DOFS, Pose, Rig, forward_kinematics
+from contact_core.rig.chart import Chart
+from contact_core.rig.rig import ROTATION_DOFS, Pose, Rig, forward_kinematics
 
 
 class HandPose:

@@ -17,8 +17,8 @@ from contact_builtins.renderers.font import CELL_HEIGHT, text_mask
 from contact_builtins.renderers.png import write_png
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.plugins.camera import LEGEND_AT, ROW, WIDEST_NAME, Camera, camera_of, legend_rows
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.camera import LEGEND_AT, ROW, WIDEST_NAME, Camera, camera_of, legend_rows
+from contact_core.scene.picture import Picture, PictureMesh
 
 OVERSAMPLE = 2
 _KEY_LIGHT = np.array([-0.45, 0.65, 0.75]) / np.linalg.norm([-0.45, 0.65, 0.75])  # camera axes

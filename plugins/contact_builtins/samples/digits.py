@@ -14,7 +14,7 @@ from contact_builtins.samples.modelling import Sizing
 from contact_builtins.samples.skeleton import Bone, bone_frame, fixed, limits, rig_of, root
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 
 MM = 1e-3
 Triple = tuple[float, float, float]

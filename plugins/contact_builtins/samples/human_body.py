@@ -17,7 +17,7 @@ from contact_builtins.samples.modelling import surface_of
 from contact_builtins.samples.skeleton import Bone, limits, rig_of, root
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
-from contact_core.pose.rig import JointFreedom
+from contact_core.rig.rig import JointFreedom
 
 
 @dataclass(frozen=True)

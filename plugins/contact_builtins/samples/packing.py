@@ -12,7 +12,7 @@ import numpy.typing as npt
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import JointFreedom, Rig
+from contact_core.rig.rig import JointFreedom, Rig
 
 RIG_ARRAYS = ("parents", "rest_local", "bind_world", "bind_points", "faces", "skin_joints", "skin_weights")
 

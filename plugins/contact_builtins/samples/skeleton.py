@@ -9,7 +9,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.rig import JointFreedom, Rig
+from contact_core.rig.rig import JointFreedom, Rig
 
 
 @dataclass(frozen=True, eq=False)

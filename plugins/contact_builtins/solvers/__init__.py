@@ -1,1 +1,1 @@
-"""Pose solvers. The default one lives in `contact_core.pose.levenberg_marquardt`."""
+"""Pose solvers. The default one lives in `contact_core.solve.levenberg_marquardt`."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput, MissingExtra
-from contact_core.pose.candidates import starting_thetas
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
-from contact_core.pose.threads import one_blas_thread
+from contact_core.solve.candidates import starting_thetas
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.threads import one_blas_thread
 
 
 class NLoptSolver:

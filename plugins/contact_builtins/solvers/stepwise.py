@@ -8,12 +8,12 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.candidates import fitted
-from contact_core.pose.levenberg_marquardt import Descent, LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
-from contact_core.pose.stages import Stage, solve_stages
-from contact_core.pose.threads import one_blas_thread
+from contact_core.solve.candidates import fitted
+from contact_core.solve.levenberg_marquardt import Descent, LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.stages import Stage, solve_stages
+from contact_core.solve.threads import one_blas_thread
 
 
 class StagedSolver:

@@ -1,1 +1,1 @@
-"""Terms of the pose objective. The paper's three live in `contact_core.pose.terms`."""
+"""Terms of the pose objective. The paper's three live in `contact_core.solve.terms`."""

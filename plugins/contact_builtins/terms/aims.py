@@ -9,12 +9,12 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.skinning import Track, joint_track
-from contact_core.pose.state import PoseState
-from contact_core.pose.terms import BoundTerm, LeastSquares
+from contact_core.rig.skinning import Track, joint_track
+from contact_core.solve.state import PoseState
+from contact_core.solve.terms import BoundTerm, LeastSquares
 
 if TYPE_CHECKING:
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.problem import PoseProblem
 
 Vector = tuple[float, float, float]
 

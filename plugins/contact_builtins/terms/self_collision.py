@@ -9,14 +9,14 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.body import uniform_scale
-from contact_core.pose.capsules import closest_on_segments, fit_capsules
-from contact_core.pose.skinning import Track, joint_track
-from contact_core.pose.state import PoseState
-from contact_core.pose.terms import BoundTerm, LeastSquares
+from contact_core.rig.capsules import closest_on_segments, fit_capsules
+from contact_core.rig.skinning import Track, joint_track
+from contact_core.solve.body import uniform_scale
+from contact_core.solve.state import PoseState
+from contact_core.solve.terms import BoundTerm, LeastSquares
 
 if TYPE_CHECKING:
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.problem import PoseProblem
 
 
 @dataclass(frozen=True)

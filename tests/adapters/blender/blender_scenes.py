@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from contact_blender.host import BlenderHost as BlenderHost
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 from contact_core.testing.host_scenes import HostScene
 
 

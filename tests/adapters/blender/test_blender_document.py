@@ -11,7 +11,7 @@ import pytest
 from contact_core.document.schema import VERSION, dump_document, parse_document
 from contact_core.errors import CommandRejected, FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import SceneSpace, StoredDocument
+from contact_core.scene.host import SceneSpace, StoredDocument
 from contact_core.session import Session
 from contact_core.testing import meshes
 from contact_core.testing.host_scenes import HostScene, SceneMesh, SceneRig, arm_rig, bent

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from contact_core.host import SceneSpace
+from contact_core.scene.host import SceneSpace
 from contact_core.testing.host_contract import Build, HostContract
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from contact_core.errors import InvalidInput
-from contact_core.host import SceneSpace
+from contact_core.scene.host import SceneSpace
 from contact_core.testing.host_scenes import HostScene, affine, contract_scene, octahedron, step_prism
 
 STILL = {  # modifiers that add or remove vertices and leave the others where they are

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.picture import Picture, PictureMesh
 
 SIZE = 64
 

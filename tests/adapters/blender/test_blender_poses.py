@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from contact_core.errors import InvalidInput
-from contact_core.host import SceneSpace
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.host import SceneSpace
 from contact_core.testing.host_checks import pose_error
 from contact_core.testing.host_scenes import HostScene, SceneRig, affine, arm_rig, bent
 
@@ -53,7 +53,7 @@ def test_a_chain_is_posed_without_evaluating_in_between(bpy: Any, arm: Any) -> N
     bpy.app.handlers.depsgraph_update_post.append(lambda *_: evaluations.append(1))
     try:
         from contact_blender import poses
-        from contact_core.scene_reading import unstretch_pose
+        from contact_core.scene.reading import unstretch_pose
 
         stretch = np.eye(3) * 0.5
         poses.write_pose(bpy.data.objects["arm"].parent, unstretch_pose(pose, stretch), None)

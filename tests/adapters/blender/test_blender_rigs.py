@@ -15,10 +15,10 @@ from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import SceneSpace
-from contact_core.pose.chart import Chart
-from contact_core.pose.rig import JointFreedom, Pose, forward_kinematics, skin
-from contact_core.pose.solver import SolveOptions
+from contact_core.rig.chart import Chart
+from contact_core.rig.rig import JointFreedom, Pose, forward_kinematics, skin
+from contact_core.scene.host import SceneSpace
+from contact_core.solve.solver import SolveOptions
 from contact_core.testing.host_checks import volume
 from contact_core.testing.host_scenes import HostScene, SceneRig, affine, arm_rig, bent
 from contact_core.testing.rigs import any_freedom, hand_like
@@ -424,9 +424,9 @@ def test_what_skinning_cannot_do_is_solved_through_blender(bpy: Any, arm: Any) -
     import blender_scenes
 
     from contact_blender.black_box import EvaluatedRig
-    from contact_core.pose.body import Body, PairedPoints
-    from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.body import Body, PairedPoints
+    from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+    from contact_core.solve.problem import PoseProblem
 
     preserve_volume(bpy, bpy.data.objects["arm"])
     black_box = EvaluatedRig(arm, "arm")

@@ -20,7 +20,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 from contact_core.cli import main
 from contact_core.document.asset import Asset
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 from contact_core.session import Session
 from contact_core.testing.host_checks import pose_error
 from contact_core.testing.host_scenes import arm_rig

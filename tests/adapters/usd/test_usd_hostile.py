@@ -18,8 +18,8 @@ from contact_core.document.asset import Asset
 from contact_core.document.schema import VERSION
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import SceneSpace, StoredDocument
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.host import SceneSpace, StoredDocument
 from contact_core.session import Session
 from contact_core.testing import meshes
 from contact_core.testing.host_checks import volume

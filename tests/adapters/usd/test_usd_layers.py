@@ -22,7 +22,7 @@ from contact_core.document.asset import Asset
 from contact_core.document.schema import VERSION, parse_document, same_documents
 from contact_core.errors import FileRefused
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import StoredDocument
+from contact_core.scene.host import StoredDocument
 from contact_core.session import Session
 from contact_core.testing import meshes
 from contact_core.testing.host_scenes import arm_rig, bent

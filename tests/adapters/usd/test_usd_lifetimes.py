@@ -21,7 +21,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 from contact_core.session import Session
 from contact_core.testing import meshes
 from contact_core.testing.host_scenes import arm_rig, bent

@@ -17,8 +17,8 @@ pytest.importorskip("pxr", reason="usd-core is not installed")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from contact_core.errors import InvalidInput
-from contact_core.host import SceneSpace
-from contact_core.pose.rig import Pose, Rig, forward_kinematics, skin
+from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
+from contact_core.scene.host import SceneSpace
 from contact_core.testing.host_checks import pose_error
 from contact_core.testing.host_scenes import SceneRig, arm_rig, bent, contract_scene
 from contact_usd.host import UsdHost
@@ -216,7 +216,7 @@ def test_a_rig_in_an_instance_is_read_and_posed_without_its_twin(tmp_path: Path)
 def test_names_and_freedoms_survive_an_export(tmp_path: Path) -> None:
     """Joint names that USD does not allow, limits, hinges: what our exporter writes it reads back."""
     from contact_core.document.asset import Asset
-    from contact_core.pose.rig import JointFreedom
+    from contact_core.rig.rig import JointFreedom
 
     made = arm_rig()
     freedoms = (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from contact_core.errors import FileRefused
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing.meshes import icosphere
 from contact_viewer import renderer as renderer_module
 from contact_viewer.renderer import PyVistaRenderer
@@ -113,7 +113,7 @@ os.environ["LD_LIBRARY_PATH"] = {str(hidden)!r}
 os.environ.pop("DISPLAY", None)
 from pathlib import Path
 from contact_builtins.renderers.software import SoftwareRenderer
-from contact_core.plugins.slots import Picture, PictureMesh
+from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing.meshes import icosphere
 from contact_core.errors import FileRefused
 from contact_viewer.renderer import PyVistaRenderer

@@ -15,7 +15,7 @@ from contact_core.edit.commands import Macro
 from contact_core.edit.verbs import SurfaceVerbs, Verbs
 from contact_core.errors import ContactError
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
 from contact_core.session import Session
 from contact_core.testing.strategies import cached_family
 

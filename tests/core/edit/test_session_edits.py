@@ -14,8 +14,8 @@ from contact_core.edit.commands import SetExtra
 from contact_core.edit.recovery import journal_path
 from contact_core.errors import CommandRejected, FileRefused
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.memory_host import MemoryHost
 from contact_core.plugins import hookimpl
+from contact_core.scene.memory_host import MemoryHost
 from contact_core.session import DocumentChanged, Session
 from contact_core.testing.strategies import cached_family
 

@@ -8,14 +8,14 @@ import pytest
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
-from contact_core.evaluated_rig import BEND, EvaluatedRig, body_of, check_skin, probes
-from contact_core.memory_host import MemoryHost
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.chart import Chart
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.poses import blend
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose
+from contact_core.rig.chart import Chart
+from contact_core.rig.poses import blend
+from contact_core.rig.rig import Pose
+from contact_core.scene.evaluated_rig import BEND, EvaluatedRig, body_of, check_skin, probes
+from contact_core.scene.memory_host import MemoryHost
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
 from contact_core.testing import rigs
 from contact_core.testing.host_scenes import arm_rig
 

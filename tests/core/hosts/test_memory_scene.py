@@ -17,10 +17,10 @@ from contact_core.edit.commands.organising import Recolor
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.placement import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import CAPABILITIES, SceneSpace, capabilities
-from contact_core.memory_host import MemoryHost
-from contact_core.pose.rig import JointFreedom, Pose, Rig, forward_kinematics, skin
-from contact_core.scene_reading import stretch_pose, stretch_rig, turn_up
+from contact_core.rig.rig import JointFreedom, Pose, Rig, forward_kinematics, skin
+from contact_core.scene.host import CAPABILITIES, SceneSpace, capabilities
+from contact_core.scene.memory_host import MemoryHost
+from contact_core.scene.reading import stretch_pose, stretch_rig, turn_up
 from contact_core.session import Session
 from contact_core.testing import meshes
 from contact_core.testing.host_scenes import affine, arm_rig, bent
@@ -165,7 +165,7 @@ def test_a_scaled_or_mirrored_rig_moves_as_its_object_does(scale, angles, seed) 
 
 def test_a_mirror_keeps_what_a_joint_may_do() -> None:
     """A limit of the mirrored rig allows the mirror image of what the limit of the rig allows."""
-    from contact_core.pose.chart import Chart
+    from contact_core.rig.chart import Chart
 
     freedom = JointFreedom(
         "euler", order="ZXY", lower=np.array([-0.1, -0.2, -0.3]), upper=np.array([0.4, 0.5, 0.6])

@@ -22,7 +22,7 @@ from contact_core.job.run import perform, run, target
 from contact_core.job.scene import posed_skin
 from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.slots import Picture
+from contact_core.scene.picture import Picture
 from contact_core.testing.meshes import icosphere, torus
 
 

@@ -10,9 +10,9 @@ from contact_core.errors import InvalidInput
 from contact_core.plugins import hookimpl
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.solving import solve_by_plugin
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, SolveOptions
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, SolveOptions
 from contact_core.testing.solver_contract import small
 
 

@@ -9,12 +9,12 @@ import pytest
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.black_box import BlackBoxDof, DeformedSkin
-from contact_core.pose.body import Body
-from contact_core.pose.chart import Chart
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Rig, skin
+from contact_core.rig.chart import Chart
+from contact_core.rig.rig import Rig, skin
+from contact_core.solve.black_box import BlackBoxDof, DeformedSkin
+from contact_core.solve.body import Body
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
 from contact_core.testing import rigs
 from contact_core.testing.term_contract import differences
 

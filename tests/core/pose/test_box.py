@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contact_core.arrays import FloatArray
-from contact_core.pose.box import box_minimum
+from contact_core.solve.box import box_minimum
 
 
 def box_problem(seed: int, dofs: int, rows: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose, Rig
+from contact_core.rig.rig import Pose, Rig
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.problem import PoseProblem
 from contact_core.testing import meshes, rigs
 
 STEP = 1e-5

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.pose.chart import Chart
-from contact_core.pose.pose_files import PoseLibrary, load_keys, load_pose, save_keys, save_pose
-from contact_core.pose.poses import PoseKeys, blend, mirrored_name, mirrored_pose, set_angles
-from contact_core.pose.rig import JointFreedom, Pose, Rig, forward_kinematics, skin
+from contact_core.rig.chart import Chart
+from contact_core.rig.pose_files import PoseLibrary, load_keys, load_pose, save_keys, save_pose
+from contact_core.rig.poses import PoseKeys, blend, mirrored_name, mirrored_pose, set_angles
+from contact_core.rig.rig import JointFreedom, Pose, Rig, forward_kinematics, skin
 from contact_core.testing import rigs
 
 HAND = rigs.hand_like(rigs.any_freedom)

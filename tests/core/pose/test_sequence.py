@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from contact_core.errors import InvalidInput
-from contact_core.pose.levenberg_marquardt import LevenbergMarquardt
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.sequence import solve_sequence
-from contact_core.pose.solver import Iteration
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.sequence import solve_sequence
+from contact_core.solve.solver import Iteration
 from contact_core.testing import rigs
 
 

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from contact_core.arrays import FloatArray
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
 
 
 class LBFGSB:

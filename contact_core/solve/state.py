@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contact_core.arrays import FloatArray
-from contact_core.pose.black_box import BlackBoxMotion
-from contact_core.pose.chart import Motion
-from contact_core.pose.skinning import Gram, Track, outward_carrier
+from contact_core.rig.chart import Motion
+from contact_core.rig.skinning import Gram, Track, outward_carrier
+from contact_core.solve.black_box import BlackBoxMotion
 
 if TYPE_CHECKING:
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.problem import PoseProblem
 
 
 class PoseState:

@@ -10,7 +10,7 @@ from contact_core.document.document import ContactDocument
 from contact_core.document.schema import VERSION, dump_document, parse_document
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected, FileRefused
-from contact_core.host import DocumentStorage, HostAdapter, StoredDocument, Undo
+from contact_core.scene.host import DocumentStorage, HostAdapter, StoredDocument, Undo
 
 if TYPE_CHECKING:
     from contact_core.session import Session

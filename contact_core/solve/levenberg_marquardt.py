@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact_core.arrays import FloatArray
-from contact_core.pose.box import box_minimum
-from contact_core.pose.candidates import starting_thetas
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
-from contact_core.pose.state import PoseState
-from contact_core.pose.threads import one_blas_thread
+from contact_core.solve.box import box_minimum
+from contact_core.solve.candidates import starting_thetas
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.state import PoseState
+from contact_core.solve.threads import one_blas_thread
 
 TRIAL_ITERATIONS = 8
 CONTINUED = 2  # how many of the starts go on

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.host import SceneSpace, StoredDocument
-from contact_core.pose.rig import JointFreedom, Pose, Rig
+from contact_core.rig.rig import JointFreedom, Pose, Rig
+from contact_core.scene.host import SceneSpace, StoredDocument
 from contact_core.whole_file import write_whole
 
 FORMAT = "contact-core.memory-scene"

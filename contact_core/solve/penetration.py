@@ -16,14 +16,14 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.inside import depth_inside
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.pose.body import uniform_scale
-from contact_core.pose.skinning import Track, vertex_track
-from contact_core.pose.state import PoseState
-from contact_core.pose.terms import BoundTerm
+from contact_core.rig.skinning import Track, vertex_track
+from contact_core.solve.body import uniform_scale
+from contact_core.solve.state import PoseState
+from contact_core.solve.terms import BoundTerm
 
 if TYPE_CHECKING:
     from contact_core.geometry.distance_field import DistanceField
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.problem import PoseProblem
 
 Solids = Mapping[str, Sequence[TriangleMesh]]  # closed meshes per rigid body, in the body's surface space
 

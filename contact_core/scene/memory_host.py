@@ -20,7 +20,9 @@ from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.placement import Placement, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.host import (
+from contact_core.rig.rig import Pose, forward_kinematics, skin
+from contact_core.scene.camera import camera_of
+from contact_core.scene.host import (
     Display,
     DocumentStorage,
     Picking,
@@ -37,11 +39,9 @@ from contact_core.host import (
     check_frame,
     check_overwrite,
 )
-from contact_core.memory_scene import MemoryObject, MemoryScene, Polygons, load_scene, save_scene
-from contact_core.plugins.camera import camera_of
-from contact_core.plugins.slots import Picture
-from contact_core.pose.rig import Pose, forward_kinematics, skin
-from contact_core.scene_reading import fit_to_scene, stretch_pose, stretch_rig, surface_of_polygons, unstretch_pose
+from contact_core.scene.memory_scene import MemoryObject, MemoryScene, Polygons, load_scene, save_scene
+from contact_core.scene.picture import Picture
+from contact_core.scene.reading import fit_to_scene, stretch_pose, stretch_rig, surface_of_polygons, unstretch_pose
 
 
 class MemoryHost(

@@ -13,15 +13,15 @@ import numpy as np
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.black_box import BlackBoxChart, BlackBoxMotion
-from contact_core.pose.body import Body, PairedPoints
-from contact_core.pose.chart import Chart, Motion
-from contact_core.pose.extent import length_of
-from contact_core.pose.pairs import Pairs, pairs_of
-from contact_core.pose.rig import Pose
-from contact_core.pose.skinning import Track
-from contact_core.pose.state import PoseState
-from contact_core.pose.terms import BoundTerm, PoseTerm, paper_terms
+from contact_core.rig.chart import Chart, Motion
+from contact_core.rig.rig import Pose
+from contact_core.rig.skinning import Track
+from contact_core.solve.black_box import BlackBoxChart, BlackBoxMotion
+from contact_core.solve.body import Body, PairedPoints
+from contact_core.solve.extent import length_of
+from contact_core.solve.pairs import Pairs, pairs_of
+from contact_core.solve.state import PoseState
+from contact_core.solve.terms import BoundTerm, PoseTerm, paper_terms
 
 Form = Literal["squares", "paper"]
 Limits = Literal["rig", "none", "paper"]

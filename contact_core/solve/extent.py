@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contact_core.arrays import BoolArray, IntArray
-from contact_core.pose.body import manipulator_length, uniform_scale
+from contact_core.solve.body import manipulator_length, uniform_scale
 
 if TYPE_CHECKING:
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.problem import PoseProblem
 
 
 def length_of(problem: PoseProblem) -> float:

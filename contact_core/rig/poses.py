@@ -12,9 +12,9 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.chart import Chart, pose_on
-from contact_core.pose.rig import Pose, Rig, forward_kinematics
-from contact_core.pose.rotations import exponential, nearest_rotations
+from contact_core.rig.chart import Chart, pose_on
+from contact_core.rig.rig import Pose, Rig, forward_kinematics
+from contact_core.rig.rotations import exponential, nearest_rotations
 
 
 def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:

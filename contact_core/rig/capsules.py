@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray, frozen
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 
 FITTED_SHARE = 0.7  # of the median distance from skin to bone: capsules stay within flesh that gives
 LEAST_VERTICES = 6

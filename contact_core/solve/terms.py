@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 
 from contact_core.arrays import FloatArray
-from contact_core.pose.state import PoseState
+from contact_core.solve.state import PoseState
 
 if TYPE_CHECKING:
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.problem import PoseProblem
 
 REFERENCE_COUNT = 800.0  # the paper's typical number of contact points
 SMALLEST_DISTANCE = 1e-3  # in l: where reweighting stops sharpening |d|

@@ -15,12 +15,12 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
-from contact_core.host import RigReading, SceneReading
-from contact_core.pose.black_box import BlackBoxDof, DeformedSkin
-from contact_core.pose.body import Body
-from contact_core.pose.chart import Chart
-from contact_core.pose.rig import Pose, Rig, forward_kinematics, skin
-from contact_core.pose.solver import PoseSolution
+from contact_core.rig.chart import Chart
+from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
+from contact_core.scene.host import RigReading, SceneReading
+from contact_core.solve.black_box import BlackBoxDof, DeformedSkin
+from contact_core.solve.body import Body
+from contact_core.solve.solver import PoseSolution
 
 TOLERANCE = 1e-4  # of the skin's diagonal: single precision of hosts stays well below
 PROBES = 3  # bent poses that are compared

@@ -21,7 +21,7 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact_core.arrays import FloatArray
-from contact_core.plugins.slots import Picture
+from contact_core.scene.picture import Picture
 
 FIELD_OF_VIEW = math.radians(28.0)  # vertical; a long lens, as a product photograph has
 ROW = 1 / 36  # of the frame's height, a row of the table or of the legend

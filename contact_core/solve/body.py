@@ -10,8 +10,8 @@ from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.black_box import BlackBox
-from contact_core.pose.rig import JointFreedom, Pose, Rig
+from contact_core.rig.rig import JointFreedom, Pose, Rig
+from contact_core.solve.black_box import BlackBox
 
 
 @dataclass(frozen=True, eq=False)

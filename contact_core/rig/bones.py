@@ -6,7 +6,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Rig
+from contact_core.rig.rig import Rig
 
 
 def bone_segments(parents: IntArray, world: FloatArray) -> FloatArray:

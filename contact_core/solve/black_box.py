@@ -19,7 +19,7 @@ from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.rig import Pose, Rig
+from contact_core.rig.rig import Pose, Rig
 
 # theta (all dofs) -> world points (k, 3) and unit normals (k, 3) of the watched contact points
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]

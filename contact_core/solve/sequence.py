@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from contact_core.errors import InvalidInput
-from contact_core.pose.poses import PoseKeys
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose
-from contact_core.pose.solver import Iteration, PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.rig.poses import PoseKeys
+from contact_core.rig.rig import Pose
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import Iteration, PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ from contact_core.document.asset import Asset
 from contact_core.document.schema import VERSION
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.plugins.slots import Picture
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.picture import Picture
 
 
 @dataclass(frozen=True)

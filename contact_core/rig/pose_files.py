@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.pose.poses import PoseKeys
-from contact_core.pose.rig import Pose
+from contact_core.rig.poses import PoseKeys
+from contact_core.rig.rig import Pose
 from contact_core.whole_file import write_whole
 
 SCHEMA = 1

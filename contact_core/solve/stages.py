@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose
-from contact_core.pose.solver import (
+from contact_core.rig.rig import Pose
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import (
     Iteration,
     PoseSolution,
     PoseSolver,

@@ -16,8 +16,8 @@ import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.pose.rig import ROTATION_DOFS, Pose, Rig
-from contact_core.pose.rotations import axis_numbers, cross_matrices, euler_chain, exponential, nearest_rotations
+from contact_core.rig.rig import ROTATION_DOFS, Pose, Rig
+from contact_core.rig.rotations import axis_numbers, cross_matrices, euler_chain, exponential, nearest_rotations
 
 _AXIS_LETTERS = "xyz"
 

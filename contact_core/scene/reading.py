@@ -17,8 +17,8 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.placement import Placement
 from contact_core.geometry.triangulate import triangulate
 from contact_core.geometry.weld import weld
-from contact_core.host import SceneSpace
-from contact_core.pose.rig import JointFreedom, Pose, Rig
+from contact_core.rig.rig import JointFreedom, Pose, Rig
+from contact_core.scene.host import SceneSpace
 
 
 def surface_of_polygons(

@@ -15,9 +15,9 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose
-from contact_core.pose.state import PoseState
+from contact_core.rig.rig import Pose
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.state import PoseState
 
 
 class SolveStatus(Enum):
@@ -186,7 +186,7 @@ def patch_residuals(problem: PoseProblem, theta: FloatArray) -> dict[str, PatchR
 
 def posed_mesh(problem: PoseProblem, state: PoseState, body: str) -> TriangleMesh:
     """The deformed surface of a body in the problem's world."""
-    from contact_core.pose.rig import skin
+    from contact_core.rig.rig import skin
 
     index = problem.body_index(body)
     rig = problem.bodies[index].rig

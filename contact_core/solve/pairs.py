@@ -11,10 +11,10 @@ import numpy as np
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.pose.skinning import Track, normal_track, point_track, watched_track
+from contact_core.rig.skinning import Track, normal_track, point_track, watched_track
 
 if TYPE_CHECKING:
-    from contact_core.pose.problem import PoseProblem
+    from contact_core.solve.problem import PoseProblem
 
 
 @dataclass(frozen=True, eq=False)

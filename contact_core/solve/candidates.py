@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from contact_core.arrays import FloatArray
-from contact_core.pose.problem import PoseProblem
-from contact_core.pose.rig import Pose
+from contact_core.rig.rig import Pose
+from contact_core.solve.problem import PoseProblem
 
 
 def starting_thetas(problem: PoseProblem, names: tuple[str, ...]) -> dict[str, FloatArray]:
