@@ -89,6 +89,11 @@ class Track:
         return Gram(self.matrix.T @ (weights[:, None] * self.matrix), weights)
 
     @classmethod
+    def empty(cls, width: int) -> Track:
+        """The track of nothing."""
+        return cls(np.zeros(0, np.int64), np.zeros((0, 0)), width)
+
+    @classmethod
     def stacked(cls, tracks: list[Track]) -> Track:
         """Several tracks below one another."""
         bones = np.unique(np.concatenate([t.bones for t in tracks]))

@@ -100,6 +100,7 @@ class PairedPoints:
     object: str
     object_points: SurfacePoints
     weights: FloatArray = field(default_factory=lambda: np.ones(0))
+    gain: float = 1.0
 
     def __post_init__(self) -> None:
         k = len(self.manipulator_points)
@@ -115,6 +116,10 @@ class PairedPoints:
                 f"weights of contact {self.name!r} must not be negative, but {weights.min():.3g} came."
             )
         object.__setattr__(self, "weights", weights)
+        if not 0.0 <= self.gain < np.inf:
+            raise InvalidInput(
+                f"the gain of contact {self.name!r} must be 0 (off) or a positive number, but got {self.gain}."
+            )
 
 
 def manipulator_length(rig: Rig, joints: IntArray | None = None) -> float:

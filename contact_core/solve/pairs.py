@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contact_core.arrays import FloatArray
-from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.skinning import Track, normal_track, point_track, watched_track
 
@@ -22,7 +21,8 @@ class Pairs:
     """All contact pairs of a problem, one below the other.
 
     manipulator_points, object_points, and their normals: the two ends. gap: the first minus the second.
-    weights: (k,) sum 1. rows: which rows are whose.
+    weights: (k,) of each point its share of the weights of all pairs, times the gain of its own pair; sum 1 while
+    every gain is 1. rows: which rows are whose.
     """
 
     manipulator_points: Track
@@ -35,12 +35,17 @@ class Pairs:
 
 
 def pairs_of(problem: PoseProblem) -> Pairs:
-    """The contact pairs of a problem as tracks. Raises InvalidInput when there is nothing to pair."""
+    """The contact pairs of a problem as tracks.
+
+    Weights are divided by the sum over all pairs whatever their gains, so what is on does not change how strong the
+    others are. A problem without contacts, or with none that holds, has pairs that cost nothing.
+    """
     if not problem.contacts:
-        raise InvalidInput("the problem has no contacts; pair at least one patch before solving.")
-    weights = np.concatenate([contact.weights for contact in problem.contacts])
-    if weights.sum() <= 0.0:
-        raise InvalidInput("all contact weights are zero; give at least one point a weight.")
+        points, normals = Track.empty(4), Track.empty(3)
+        return Pairs(points, points, normals, normals, points, np.zeros(0), {})
+    shares = np.concatenate([contact.weights for contact in problem.contacts])
+    gains = np.repeat([c.gain for c in problem.contacts], [len(c.weights) for c in problem.contacts])
+    weights = gains * shares / max(float(shares.sum()), np.finfo(float).tiny)
     ends = np.cumsum([0, *(len(contact.weights) for contact in problem.contacts)])
     rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(problem.contacts)}
     manipulators = [(contact.manipulator, contact.manipulator_points) for contact in problem.contacts]
@@ -48,7 +53,7 @@ def pairs_of(problem: PoseProblem) -> Pairs:
     first, first_normals = _tracks(problem, manipulators, as_object=False)
     second, second_normals = _tracks(problem, objects, as_object=True)
     gap = first.combined(second, -1.0)
-    return Pairs(first, second, first_normals, second_normals, gap, weights / weights.sum(), rows)
+    return Pairs(first, second, first_normals, second_normals, gap, weights, rows)
 
 
 def _tracks(

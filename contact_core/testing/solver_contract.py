@@ -226,12 +226,15 @@ class SolverContract(Contract):
         assert later.value <= later.start_value
 
     def test_s16_refuses_in_words(self, solver: PoseSolver, options: SolveOptions) -> None:
-        """A problem without contacts, and a setting it does not have, are InvalidInput with a sentence."""
+        """A setting it does not have is InvalidInput with a sentence; a problem without contacts is none, and keeps
+        to its prior."""
+        problem = small()
         misspelt = replace(options, more={**options.more, "misspelt": 1})
-        for problem, settings in ((replace(small(), contacts=()), options), (small(), misspelt)):
-            with pytest.raises(InvalidInput) as refusal:
-                solver.solve(problem, settings)
-            assert len(str(refusal.value).split()) >= 5
+        with pytest.raises(InvalidInput) as refusal:
+            solver.solve(problem, misspelt)
+        assert len(str(refusal.value).split()) >= 5
+        started = replace(problem, contacts=(), prior="current")
+        assert np.allclose(solver.solve(started, options).theta, started.start, atol=1e-6)
 
     def test_s17_leaves_its_input_alone(self, solver: PoseSolver, options: SolveOptions) -> None:
         """The arrays of the problem are the same bits afterwards."""
