@@ -21,6 +21,7 @@ from harness import record
 
 from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_builtins.solvers.stepwise import MultiStartSolver
+from contact_core.errors import Cancelled
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
 from contact_core.rig.rotations import exponential
@@ -152,17 +153,22 @@ def beside_the_authors(count: int, most: int) -> list[dict[str, float]]:
         problem = six_patches(seed)
         optimum = LevenbergMarquardt().solve(problem).value
 
-        def reached(seen: Iteration, goal: float = 1.02 * optimum) -> bool:
-            return seen.value <= goal
+        def reached(seen: Iteration, goal: float = 1.02 * optimum) -> None:
+            if seen.value <= goal:
+                raise Cancelled("near enough to the optimum.")
 
-        own = LevenbergMarquardt().solve(problem, None, reached)
+        own = LevenbergMarquardt().solve(problem, SolveOptions(watch=reached))
         mma = SolveOptions(
-            max_iterations=most, tolerance=0.0, candidates=("current",), more={"algorithm": "LD_MMA"}
+            max_iterations=most,
+            tolerance=0.0,
+            candidates=("current",),
+            more={"algorithm": "LD_MMA"},
+            watch=reached,
         )
-        ours = NLoptSolver().solve(problem, mma, reached)
+        ours = NLoptSolver().solve(problem, mma)
         fields = {name: getattr(problem, name) for name in PoseProblem.__dataclass_fields__}
         counted.evaluations = 0
-        authors = NLoptSolver().solve(ForwardDifferences(**fields), mma, reached)
+        authors = NLoptSolver().solve(ForwardDifferences(**fields), mma)
         rows.append(
             {
                 "evaluations": own.evaluations,

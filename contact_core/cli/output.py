@@ -9,21 +9,26 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO
 
+from contact_core.progress import Progress
+
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress as Bar
+    from rich.progress import TaskID
 
 _SHOW_AFTER_S = 1.0  # a bar for anything longer than a second, and none for what is over at once
 
 
-class Output:
-    """json: one JSON document on stdout and nothing else. quiet: no progress and no remarks. stdout: where answers
+class Output(Progress):
+    """How a command answers, and the progress that is told: on a command line, Ctrl+C is what cancels.
+
+    json: one JSON document on stdout and nothing else. quiet: no progress and no remarks. stdout: where answers
     go, where sys.stdout is lent to others."""
 
     def __init__(self, *, json: bool = False, quiet: bool = False, stdout: TextIO | None = None) -> None:
         self.json = json
         self.quiet = quiet
         self._stdout = stdout
-        self._bar: Progress | None = None
+        self._bar: Bar | None = None
         self._task: TaskID | None = None
         self._since = time.monotonic()
 
@@ -46,20 +51,19 @@ class Output:
         """One sentence on stderr."""
         _say(" ".join(f"contact: {text}".split()), sys.stderr)
 
-    def progress(self, fraction: float, text: str) -> bool:
-        """A step of something long: fraction 0..1 done. Always True: on a command line, Ctrl+C is what cancels."""
+    def tell(self, fraction: float | None, text: str) -> None:
+        """A bar on stderr, where that is a terminal and the work takes more than a second."""
         if not self.quiet and sys.stderr.isatty():
             if self._bar is None and time.monotonic() - self._since > _SHOW_AFTER_S:
                 self._start(text)
             if self._bar is not None and self._task is not None:
                 self._bar.update(self._task, completed=fraction, description=text)
-        return True
 
     def _start(self, text: str) -> None:
         from rich.console import Console
-        from rich.progress import Progress
+        from rich.progress import Progress as Bar
 
-        self._bar = Progress(console=Console(stderr=True), transient=True)
+        self._bar = Bar(console=Console(stderr=True), transient=True)
         self._task = self._bar.add_task(text, total=1.0)
         self._bar.start()
 

@@ -24,9 +24,7 @@ class Pose:
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.job.run import run_recipe
 
-        result = run_recipe(
-            arguments.recipe, arguments.out, plugins=arguments.plugins, progress=arguments.output.progress
-        )
+        result = run_recipe(arguments.recipe, arguments.out, plugins=arguments.plugins, progress=arguments.output)
         tell(result, arguments.output)
         return int(arguments.check and not result.verdict.is_grasp)
 

@@ -44,7 +44,7 @@ def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
         report = report_of(job, renderer)
         write_whole(stage / FILES["report"], json.dumps(report, indent=2, allow_nan=False) + "\n")
         written = {role: out / name for role, name in FILES.items() if (stage / name).exists()}
-    job.tell(1.0, "Done")
+        job.progress.tell(1.0, "Finishing")  # the last moment to cancel: from here on the files are written
     return JobResult(job.recipe, report, job.verdict, written, rows)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.document.asset import Asset
-from contact_core.errors import InvalidInput
+from contact_core.errors import Cancelled, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.assets import object_mesh, read_source, solids_of
 from contact_core.job.metrics import Contact, PosedScene, measure
@@ -25,10 +25,11 @@ from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.report import judge
 from contact_core.job.scene import away_pose, coarse_pose, posed_skin, posed_world, world_from_object
 from contact_core.job.solving import move_contacts, solve
-from contact_core.job.workpiece import HAND, OBJECT, Job, JobProgress, JobResult
+from contact_core.job.workpiece import HAND, OBJECT, Job, JobResult
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import PLACERS
 from contact_core.plugins.slots import PlacementRequest, PlacementResult
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.bones import bone_segments
 from contact_core.rig.rig import Pose
 from contact_core.session import Session
@@ -36,7 +37,7 @@ from contact_core.whole_set import check_writable
 
 
 def run_recipe(
-    path: Path | str, out: Path | str, *, plugins: PluginManager | None = None, progress: JobProgress | None = None
+    path: Path | str, out: Path | str, *, plugins: PluginManager | None = None, progress: Progress = NO_PROGRESS
 ) -> JobResult:
     """Run a recipe file and write its results into `out`. Raises ContactError; then nothing is half-written."""
     return run(load_recipe(Path(path)), out, plugins=plugins, progress=progress)
@@ -47,22 +48,28 @@ def run(
     out: Path | str,
     *,
     plugins: PluginManager | None = None,
-    progress: JobProgress | None = None,
+    progress: Progress = NO_PROGRESS,
 ) -> JobResult:
-    """Run a recipe and write document, pose, posed model, pictures and report into `out`."""
+    """Run a recipe and write document, pose, posed model, pictures and report into `out`.
+
+    Raises ContactError; Cancelled when progress raises it. Then nothing is written.
+    """
     plugins, out = plugins or PluginManager(), Path(out)
     check_writable(out, FILES.values())  # before the work, not after it
-    return write_outputs(perform(recipe, plugins, progress=progress), out, plugins)
+    try:
+        return write_outputs(perform(recipe, plugins, progress=progress), out, plugins)
+    except Cancelled as cancelled:
+        raise Cancelled("the job was cancelled; nothing was written.") from cancelled
 
 
-def perform(recipe: Recipe, plugins: PluginManager, *, progress: JobProgress | None = None) -> Job:
+def perform(recipe: Recipe, plugins: PluginManager, *, progress: Progress = NO_PROGRESS) -> Job:
     """All of a job but its files: read, paint, place, solve, measure. Raises ContactError."""
     job = prepare(recipe, plugins, progress=progress)
     _solve(job, plugins)
     return job
 
 
-def prepare(recipe: Recipe, plugins: PluginManager, *, progress: JobProgress | None = None) -> Job:
+def prepare(recipe: Recipe, plugins: PluginManager, *, progress: Progress = NO_PROGRESS) -> Job:
     """A job up to its solve: read, painted, placed and paired; `solving.pose_problem` makes its problem."""
     job = Job(recipe, Session(discover=False), progress)
     _read(job, plugins)
@@ -167,7 +174,7 @@ def _solve(job: Job, plugins: PluginManager) -> None:
     with job.stage("solve", 0.45, "Solving the pose"):
         solve(job, plugins)
         move_contacts(job, plugins)
-    job.tell(0.7, "Measuring")
+    job.progress.tell(0.7, "Measuring")
     job.metrics = measure(posed_scene(job, job.pose))
     job.verdict = judge(job.metrics, job.placement.left_out, job.recipe.accept)
 

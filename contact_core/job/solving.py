@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from contact_core.edit.pose_problem import pose_problem as problem_of_pairs
 from contact_core.errors import Cancelled
 from contact_core.job.workpiece import HAND, OBJECT, Job
@@ -13,17 +15,21 @@ from contact_core.proposals.proposal import AGAIN, Proposal, ProposalSettings, s
 from contact_core.rig.rig import Pose
 from contact_core.solve.body import Body
 from contact_core.solve.problem import Limits, PoseProblem
-from contact_core.solve.solver import Iteration, PoseSolution, Progress, SolveOptions, SolveStatus
+from contact_core.solve.solver import PoseSolution, SolveOptions, SolveStatus
 from contact_core.solve.terms import PoseTerm, paper_terms
+
+SOLVE, MOVE, MEASURE = 0.45, 0.55, 0.7  # where these begin, as fractions of the job
 
 
 def solve(job: Job, plugins: PluginManager) -> None:
     """Pose the manipulator by the job's pairs. Raises Cancelled when the user stops it, InvalidInput for wrong
     settings."""
     problem, options = pose_problem(job, plugins, job.start), _options(job)
-    solution = solve_by_plugin(problem, plugins, job.recipe.solve.solver, options, _progress(job, options))
+    moves = job.recipe.solve.settle or job.recipe.solve.slide
+    part = job.progress.part(SOLVE, MOVE if moves else MEASURE, "Solving the pose")
+    solution = solve_by_plugin(problem, plugins, job.recipe.solve.solver, options, part)
     if solution.status is SolveStatus.CANCELLED:
-        raise Cancelled("the job was cancelled; nothing was written.")
+        raise Cancelled("the solve was cancelled.")
     _take(job, solution)
     job.session.set_pose(HAND, job.pose, title="Solve")
 
@@ -35,14 +41,16 @@ def move_contacts(job: Job, plugins: PluginManager) -> None:
         solver=spec.solver,
         options=options,
         terms=_terms(job, plugins),
-        progress=_progress(job, options),
         limits=_limits(job),
         solids={OBJECT: job.solids} if job.solids else {},
     )
+    middle = 0.5 * (MOVE + MEASURE)
     if spec.settle:
-        _accept(job, settle(_draft(job), plugins, job.session.revision, settings, rounds=spec.settle))
+        settling = replace(settings, progress=job.progress.part(MOVE, middle, "Settling contacts"))
+        _accept(job, settle(_draft(job), plugins, job.session.revision, settling, rounds=spec.settle))
     if spec.slide:
-        _accept(job, slide(_draft(job), plugins, job.session.revision, settings, slack=spec.slide))
+        sliding = replace(settings, progress=job.progress.part(middle, MEASURE, "Sliding contacts"))
+        _accept(job, slide(_draft(job), plugins, job.session.revision, sliding, slack=spec.slide))
 
 
 def _draft(job: Job) -> Draft:
@@ -70,16 +78,6 @@ def _options(job: Job, candidates: tuple[str, ...] | None = None) -> SolveOption
         seed=wanted.pop("seed", 0),
         more=wanted,
     )
-
-
-def _progress(job: Job, options: SolveOptions) -> Progress:
-    def seen(iteration: Iteration) -> bool:
-        share = min(iteration.number / options.max_iterations, 1.0)
-        if job.progress is None:
-            return False
-        return job.progress(0.45 + 0.2 * share, f"Solving the pose, iteration {iteration.number}") is False
-
-    return seen
 
 
 def pose_problem(job: Job, plugins: PluginManager, start: Pose) -> PoseProblem:

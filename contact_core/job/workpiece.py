@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,18 +12,15 @@ from typing import Any
 
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
-from contact_core.errors import Cancelled
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.job.recipe import Recipe
 from contact_core.job.report import Verdict
 from contact_core.plugins.slots import PlacementResult
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.rig import Pose, Rig
 from contact_core.session import Session
 from contact_core.solve.body import manipulator_length
 from contact_core.solve.solver import PoseSolution
-
-# Called with a fraction 0..1 and a text; False cancels the job.
-JobProgress = Callable[[float, str], bool | None]
 
 HAND, OBJECT = "manipulator", "object"  # names of the two surfaces in the document
 
@@ -34,7 +31,7 @@ class Job:
 
     recipe: Recipe
     session: Session
-    progress: JobProgress | None = None
+    progress: Progress = NO_PROGRESS
     seconds: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -63,17 +60,12 @@ class Job:
     @contextmanager
     def stage(self, name: str, fraction: float, text: str) -> Iterator[None]:
         """One stage: tell the user, take the time."""
-        self.tell(fraction, text)
+        self.progress.tell(fraction, text)
         began = time.perf_counter()
         try:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - began
-
-    def tell(self, fraction: float, text: str) -> None:
-        """Report progress. Raises Cancelled when the user wants to stop."""
-        if self.progress is not None and self.progress(fraction, text) is False:
-            raise Cancelled("the job was cancelled; nothing was written.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import POSE_SOLVERS
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, Progress, SolveOptions
+from contact_core.solve.solver import PoseSolution, SolveOptions
 
 
 def solve_by_plugin(
@@ -16,7 +17,7 @@ def solve_by_plugin(
     plugins: PluginManager,
     solver: str | None = None,
     options: SolveOptions | None = None,
-    progress: Progress | None = None,
+    progress: Progress = NO_PROGRESS,
 ) -> PoseSolution:
     """The solution of a problem. solver: a name; None asks `contact_choose_pose_solver` and then takes the first
     solver offered. Afterwards `contact_pose_solved` tells every plugin. Raises InvalidInput for an unknown name.
@@ -40,6 +41,6 @@ class PluginSolver:
     summary = "The solver that was named, or that the plugins choose."
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         return solve_by_plugin(problem, self.plugins, self.wanted, options, progress)

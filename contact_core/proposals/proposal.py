@@ -17,6 +17,7 @@ from contact_core.errors import Cancelled, InvalidInput
 from contact_core.plugins.registry import PLACERS, POSE_SOLVERS
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.plugins.solving import PluginSolver
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 from contact_core.proposals.draft import Draft, change
 from contact_core.proposals.sliding import solve_sliding
@@ -25,7 +26,7 @@ from contact_core.solve.body import uniform_scale
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import Solids
 from contact_core.solve.problem import Limits, PoseProblem
-from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 from contact_core.solve.terms import PoseTerm, paper_terms
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class ProposalSettings:
     solver: str | None = None
     options: SolveOptions | None = None
     terms: tuple[PoseTerm, ...] = paper_terms()
-    progress: Progress | None = None
+    progress: Progress = NO_PROGRESS
     limits: Limits = "rig"
     solids: Solids | None = None
 
@@ -88,13 +89,14 @@ def settle(
     """
     start, solver = draft.document, settings.solver_of(plugins)
     problem, options = _problem_and_options(draft, settings)
-    before = after = _solved(draft, solver, problem, options, settings.progress)
+    parts = [settings.progress.part(k / (rounds + 1), (k + 1) / (rounds + 1)) for k in range(rounds + 1)]
+    before = after = _solved(draft, solver, problem, options, parts[0])
     best, left_out = draft.document, dict[str, str]()
-    for _ in range(rounds):
+    for part in parts[1:]:
         left_out = _place_all(draft, plugins, problem, reach, settings.solids or {})
         again = replace(options, candidates=AGAIN)
         moved = draft.problem(settings.terms, limits=settings.limits)
-        solution = _solved(draft, solver, moved, again, settings.progress)
+        solution = _solved(draft, solver, moved, again, part)
         if solution.value < after.value:
             best, after = draft.document, solution
     command = change(start, best, "Settle contacts")
@@ -140,7 +142,7 @@ def _problem_and_options(draft: Draft, settings: ProposalSettings) -> tuple[Pose
 
 
 def _solved(
-    draft: Draft, solver: PoseSolver, problem: PoseProblem, options: SolveOptions, progress: Progress | None
+    draft: Draft, solver: PoseSolver, problem: PoseProblem, options: SolveOptions, progress: Progress
 ) -> PoseSolution:
     solution = solver.solve(problem, options, progress)
     _raise_if_cancelled(solution)

@@ -14,12 +14,13 @@ import numpy as np
 
 from contact_core.contact.placement import Root
 from contact_core.errors import InvalidInput
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.depth_bound import DepthBound, measured
 from contact_core.proposals.sliding_targets import SlidingPatch, SlidingTargets
 from contact_core.solve.body import Body
 from contact_core.solve.penetration import Solids
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 
 SLIDING = ".sliding"  # what the body of the sliding patches of a surface is called: its name and this
 ITERATIONS = 20  # at most in a round: the pose is nearly there, and what comes later gains a few hundredths
@@ -80,7 +81,7 @@ def solve_sliding(
     problem: PoseProblem,
     patches: Sequence[SlidingPatch],
     options: SolveOptions | None = None,
-    progress: Progress | None = None,
+    progress: Progress = NO_PROGRESS,
     solids: Solids | None = None,
 ) -> SlidSolution:
     """Solve the pose with fixed targets first, then pose and slides together from there, no deeper than there.
@@ -89,11 +90,13 @@ def solve_sliding(
     stays out of; by default the surfaces of rigid bodies. The deepest skin vertex is then no deeper than before,
     and no more of the skin's area is inside; where no slide keeps to that, nothing slides.
     """
-    fixed = solver.solve(problem, options, progress)
+    fixed = solver.solve(problem, options, progress.part(0.0, 0.5, "before sliding"))
     together = sliding_problem(problem.at(fixed.theta), patches)
     options = options or SolveOptions()
     settings = replace(options, max_iterations=min(options.max_iterations, ITERATIONS), candidates=("current",))
-    solution = _no_deeper(solver, together, fixed, settings, progress, solids)
+    if fixed.status is SolveStatus.CANCELLED:
+        return SlidSolution(fixed, _still(together, fixed), {})
+    solution = _no_deeper(solver, together, fixed, settings, progress.part(0.5, 1.0, "sliding"), solids)
     roots: dict[str, Root] = {}
     for index, body in enumerate(together.bodies):
         if isinstance(body.black_box, SlidingTargets):
@@ -106,7 +109,7 @@ def _no_deeper(
     problem: PoseProblem,
     fixed: PoseSolution,
     options: SolveOptions,
-    progress: Progress | None,
+    progress: Progress,
     solids: Solids | None,
 ) -> PoseSolution:
     """The solution of a problem with no skin deeper in the solids than at its start, which is `fixed`.
@@ -115,9 +118,10 @@ def _no_deeper(
     path to them passes a vertex.
     """
     bound, begin, rounds = DepthBound.of(problem, solids), problem, list[PoseSolution]()
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         wall = bound.term()
-        found = solver.solve(replace(begin, terms=(*problem.terms, wall)), options, progress)
+        part = progress.part(number / ROUNDS, (number + 1) / ROUNDS)
+        found = solver.solve(replace(begin, terms=(*problem.terms, wall)), options, part)
         theta = problem.theta_of(found.poses) if rounds else found.theta  # later rounds solve for the pose alone
         rounds.append(found)
         now = measured(problem, theta, bound.solids)
@@ -129,8 +133,12 @@ def _no_deeper(
         slid = {name: pose.joints for name, pose in found.poses.items() if name.endswith(SLIDING)}
         begin, bound = replace(problem.at(theta), held={**(problem.held or {}), **slid}), bound.tightened(now)
     note = f"After {ROUNDS} rounds skin was still deeper than before, so the contacts stay where they are."
-    still = replace(fixed, problem=problem, theta=problem.start, start_value=fixed.value)
-    return _in_all(rounds, replace(still, notes=(*fixed.notes, note)))
+    return _in_all(rounds, replace(_still(problem, fixed), notes=(*fixed.notes, note)))
+
+
+def _still(problem: PoseProblem, fixed: PoseSolution) -> PoseSolution:
+    """The solution of a sliding problem in which nothing slides."""
+    return replace(fixed, problem=problem, theta=problem.start, start_value=fixed.value)
 
 
 def _in_all(rounds: Sequence[PoseSolution], answer: PoseSolution) -> PoseSolution:

@@ -22,6 +22,7 @@ from contact_core.document.asset import Asset
 from contact_core.document.schema import VERSION
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.progress import Progress
 from contact_core.rig.rig import Pose
 from contact_core.scene.picture import Picture
 
@@ -210,10 +211,12 @@ class Picking(HostAdapter, Protocol):
 
 
 @runtime_checkable
-class Progress(HostAdapter, Protocol):
+class ProgressDisplay(HostAdapter, Progress, Protocol):
+    """The host's own display of progress, and its user's wish to stop: a `contact_core.progress.Progress`."""
+
     @abstractmethod
-    def progress(self, fraction: float, text: str) -> bool:
-        """Tell the user; False when the user asked to cancel."""
+    def cancel(self) -> None:
+        """The user asks the work that runs to stop: the next `tell` raises Cancelled, once."""
         ...
 
 
@@ -227,7 +230,7 @@ CAPABILITIES: dict[str, type] = {
     "selection": SelectionReading,
     "display": Display,
     "picking": Picking,
-    "progress": Progress,
+    "progress": ProgressDisplay,
 }
 
 

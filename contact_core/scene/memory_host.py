@@ -17,7 +17,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused, InvalidInput
+from contact_core.errors import Cancelled, FileRefused, InvalidInput
 from contact_core.geometry.placement import Placement, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose, forward_kinematics, skin
@@ -27,7 +27,7 @@ from contact_core.scene.host import (
     DocumentStorage,
     Picking,
     PoseWriting,
-    Progress,
+    ProgressDisplay,
     RigReading,
     SceneObject,
     SceneReading,
@@ -54,7 +54,7 @@ class MemoryHost(
     SelectionReading,
     Display,
     Picking,
-    Progress,
+    ProgressDisplay,
 ):
     """A scene in memory: of the file at `path`, or `scene`, or empty of `space`. Raises FileRefused."""
 
@@ -74,8 +74,8 @@ class MemoryHost(
         self._depth = 0  # of open steps
         self._listeners: list[Callable[[], None]] = []
         self.picture: Picture | None = None
-        self.told: list[tuple[float, str]] = []  # progress so far
-        self.cancel_asked = False
+        self.told: list[tuple[float | None, str]] = []  # progress so far
+        self._cancel_asked = False
 
     @property
     def scene(self) -> MemoryScene:
@@ -253,9 +253,14 @@ class MemoryHost(
         toward = np.stack([x, y, np.full(len(screen), -1.0)], axis=1) @ camera.camera_from_world  # (k, 3)
         return np.tile(camera.eye, (len(screen), 1)), toward / np.linalg.norm(toward, axis=1, keepdims=True)
 
-    def progress(self, fraction: float, text: str) -> bool:
+    def tell(self, fraction: float | None, text: str) -> None:
         self.told.append((fraction, text))
-        return not self.cancel_asked
+        asked, self._cancel_asked = self._cancel_asked, False
+        if asked:
+            raise Cancelled("it was cancelled in the host.")
+
+    def cancel(self) -> None:
+        self._cancel_asked = True
 
     def _object(self, object_id: str) -> MemoryObject:
         try:

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact_core.arrays import FloatArray
+from contact_core.errors import Cancelled
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.solve.box import box_minimum
 from contact_core.solve.candidates import starting_thetas
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.solver import PoseSolution, Run, SolveOptions, SolveStatus, unsolvable
 from contact_core.solve.state import PoseState
 from contact_core.solve.threads import one_blas_thread
 
@@ -34,15 +36,15 @@ class LevenbergMarquardt:
     summary = "Bounded Levenberg-Marquardt from the current pose and two rigid fits; the default."
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
         options.check_settings(self.name)
         with one_blas_thread():
             return self._solve(problem, options, progress)
 
-    def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress | None) -> PoseSolution:
-        run = Run(self.name, problem, progress)
+    def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress) -> PoseSolution:
+        run = Run(self.name, problem, options, progress)
         stopped = unsolvable(run)
         if stopped is not None:
             return stopped
@@ -50,7 +52,7 @@ class LevenbergMarquardt:
         try:
             descents = [Descent(run, theta, options.tolerance) for theta in starts.values()]
             return run.solution(_race(descents, options.max_iterations))
-        except Stop:
+        except Cancelled:
             return run.solution(SolveStatus.CANCELLED)
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from operator import length_hint
 from typing import Literal
 
 from contact_core.errors import InvalidInput
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.poses import PoseKeys
 from contact_core.rig.rig import Pose
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import Iteration, PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,32 +34,29 @@ def solve_sequence(
     *,
     prior: Literal["problem", "previous"] = "previous",
     options: SolveOptions | None = None,
-    progress: Progress | None = None,
+    progress: Progress = NO_PROGRESS,
+    count: int | None = None,
 ) -> SequenceSolution:
     """Solve problems at rising frames, each from the last solution's poses.
 
     The problems may differ in all but what moves: the object stands elsewhere or in another size, contacts slide.
     prior: what each frame's own problem says, or the pose of the frame before (the first frame keeps its own).
-    The starting candidates serve the first frame only: a hand must not jump between frames.
+    The starting candidates serve the first frame only: a hand must not jump between frames. count: how many frames
+    there are, for progress, where `frames` does not say. When it is cancelled, the frames that are done remain.
     """
     options = options or SolveOptions()
     done: list[float] = []
     solutions: list[PoseSolution] = []
-    cancelled = False
-
-    def watch(seen: Iteration) -> bool:
-        nonlocal cancelled
-        cancelled = bool(progress is not None and progress(seen))
-        return cancelled
-
+    count = length_hint(frames) if count is None else count
     for frame, problem in frames:
         if done and frame <= done[-1]:
             raise InvalidInput(f"frames must rise, but {frame:g} comes after {done[-1]:g}.")
         if solutions:
             problem = _continued(problem, solutions[-1], prior)
             options = replace(options, candidates=("current",))
-        solution = solver.solve(problem, options, watch)
-        if cancelled or solution.status is SolveStatus.CANCELLED:
+        part = progress.part(len(done) / max(count, 1), (len(done) + 1) / max(count, 1), f"frame {frame:g}")
+        solution = solver.solve(problem, options, part)
+        if solution.status is SolveStatus.CANCELLED:
             break
         done.append(float(frame))
         solutions.append(solution)

@@ -15,6 +15,7 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.rig import Pose
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.state import PoseState
@@ -32,7 +33,7 @@ class SolveStatus(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Iteration:
-    """One iteration as a progress callback sees it. theta: (d,) the best pose so far; poses() gives it by body."""
+    """One iteration as `SolveOptions.watch` sees it. theta: (d,) the best pose so far; poses() gives it by body."""
 
     number: int
     value: float
@@ -46,17 +47,14 @@ class Iteration:
         return self.problem.poses(self.theta)
 
 
-# Called once per iteration; a true answer cancels the solve within that iteration.
-Progress = Callable[[Iteration], bool | None]
-
-
 @dataclass(frozen=True)
 class SolveOptions:
     """What every solver understands; `more` holds a solver's own settings by name.
 
     max_iterations: over all starts of one stage. tolerance: relative decrease of the objective below which a
     pose counts as settled. candidates: where to start from, of "current", "positions" (rigid fit of the paired
-    points), "normals" (the fit with normals); fits are left out where the root is held.
+    points), "normals" (the fit with normals); fits are left out where the root is held. watch: is shown every
+    iteration with its pose, for a ghost that moves along; it may raise Cancelled, as progress may.
     """
 
     max_iterations: int = 200
@@ -64,6 +62,7 @@ class SolveOptions:
     candidates: tuple[str, ...] = ("current", "positions", "normals")
     seed: int = 0
     more: Mapping[str, Any] = field(default_factory=dict)
+    watch: Callable[[Iteration], object] | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         known = ("current", "positions", "normals")
@@ -97,9 +96,13 @@ class PoseSolver(Protocol):
     summary: str
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
-        """The best pose found, with a truthful status. InvalidInput for a wrong problem, never for a hard one."""
+        """The best pose found, with a truthful status. InvalidInput for a wrong problem, never for a hard one.
+
+        Tells progress every iteration; Cancelled raised there ends the solve within the iteration, with the best
+        pose so far and the status CANCELLED.
+        """
         ...
 
 
@@ -193,19 +196,25 @@ def posed_mesh(problem: PoseProblem, state: PoseState, body: str) -> TriangleMes
     return TriangleMesh(skin(rig, state.motions[index].world), rig.faces)
 
 
-class Stop(Exception):
-    """Raised by a run when the user cancels."""
-
-
 class Run:
-    """One solve as it happens: counts, remembers the best pose ever seen, traces, reports, cancels.
+    """One solve as it happens: counts, remembers the best pose ever seen, traces, tells progress.
 
     A solver asks `evaluate` for every state it looks at and calls `iteration` once per iteration; whatever
-    happens afterwards, `solution` returns the best pose that was ever evaluated within the limits.
+    happens afterwards, `solution` returns the best pose that was ever evaluated within the limits. budget: how many
+    iterations make the whole, those of the options by default.
     """
 
-    def __init__(self, solver: str, problem: PoseProblem, progress: Progress | None) -> None:
-        self.solver, self.problem, self.progress = solver, problem, progress
+    def __init__(
+        self,
+        solver: str,
+        problem: PoseProblem,
+        options: SolveOptions,
+        progress: Progress = NO_PROGRESS,
+        *,
+        budget: int | None = None,
+    ) -> None:
+        self.solver, self.problem, self.progress, self.watch = solver, problem, progress, options.watch
+        self.budget = options.max_iterations if budget is None else budget
         self.began = time.perf_counter()
         self.evaluations = 0
         self.trace: list[float] = []
@@ -224,20 +233,20 @@ class Run:
         return state, value
 
     def iteration(self, theta: FloatArray | None = None, value: float | None = None) -> None:
-        """Report the best pose, or the pose of a stage; raises Stop when the callback cancels."""
+        """Show and tell the best pose, or the pose of a stage. Raises Cancelled when the work is to stop."""
         self.trace.append(self.best_value if value is None else value)
-        if self.progress is None:
-            return
-        seen = Iteration(
-            number=len(self.trace),
-            value=self.trace[-1],
-            evaluations=self.evaluations,
-            seconds=time.perf_counter() - self.began,
-            problem=self.problem,
-            theta=(self.best_theta if theta is None else theta).copy(),
-        )
-        if self.progress(seen):
-            raise Stop
+        number = len(self.trace)
+        if self.watch is not None:
+            seen = Iteration(
+                number=number,
+                value=self.trace[-1],
+                evaluations=self.evaluations,
+                seconds=time.perf_counter() - self.began,
+                problem=self.problem,
+                theta=(self.best_theta if theta is None else theta).copy(),
+            )
+            self.watch(seen)
+        self.progress.tell(min(number / self.budget, 1.0), f"iteration {number}")
 
     def solution(self, status: SolveStatus) -> PoseSolution:
         """The answer with the best pose seen."""

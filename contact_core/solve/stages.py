@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
+from contact_core.progress import Progress
 from contact_core.rig.rig import Pose
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import (
     Iteration,
     PoseSolution,
     PoseSolver,
-    Progress,
     Run,
     SolveOptions,
     SolveStatus,
-    Stop,
     unsolvable,
 )
 
@@ -82,21 +81,24 @@ def solve_stages(
     problem: PoseProblem,
     stages: Sequence[Stage],
     options: SolveOptions,
-    progress: Progress | None,
+    progress: Progress,
 ) -> PoseSolution:
     """Solve stage after stage, each from where the last one ended; the best end by the whole objective counts.
 
     The first stage starts from the candidates of `options`, the later ones from where they are.
     """
-    run = Run(name, problem, progress)
+    run = Run(name, problem, options)
     stopped = unsolvable(run)
     if stopped is not None:
         return stopped
     theta, status = problem.start, SolveStatus.CONVERGED
     for number, stage in enumerate(stages):
         staged = stage.of(problem, theta)
-        settings = options if number == 0 else replace(options, candidates=("current",))
-        solution = inner.solve(staged, settings, _relayed(run, theta))
+        settings = replace(options, watch=_relayed(run, theta))
+        if number:
+            settings = replace(settings, candidates=("current",))
+        part = progress.part(number / len(stages), (number + 1) / len(stages), stage.name)
+        solution = inner.solve(staged, settings, part)
         if solution.status is SolveStatus.NOTHING_FREE:
             run.notes.append(f"stage {stage.name or number + 1} frees nothing and was passed over.")
             continue
@@ -108,16 +110,11 @@ def solve_stages(
     return run.solution(status)
 
 
-def _relayed(run: Run, start: FloatArray) -> Progress:
-    """Reports a stage's iterations as those of the whole run."""
+def _relayed(run: Run, start: FloatArray) -> Callable[[Iteration], None]:
+    """Shows a stage's iterations as those of the whole run."""
 
-    def relay(seen: Iteration) -> bool:
-        theta = run.problem.theta_of(seen.poses()) if run.progress is not None else start
+    def relay(seen: Iteration) -> None:
         run.evaluations += 1
-        try:
-            run.iteration(theta, seen.value)
-        except Stop:
-            return True
-        return False
+        run.iteration(run.problem.theta_of(seen.poses()) if run.watch is not None else start, seen.value)
 
     return relay

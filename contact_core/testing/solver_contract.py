@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -9,8 +10,9 @@ import numpy as np
 import pytest
 
 from contact_core.arrays import FloatArray
-from contact_core.errors import InvalidInput
+from contact_core.errors import Cancelled, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.progress import NO_PROGRESS, CallbackProgress
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
@@ -150,9 +152,9 @@ class SolverContract(Contract):
         assert first.trace == second.trace
 
     def test_s09_shows_every_iteration(self, solver: PoseSolver, options: SolveOptions) -> None:
-        """The callback sees iterations 1, 2, 3 ... each with a pose within the limits and a finite objective."""
+        """`watch` sees iterations 1, 2, 3 ... each with a pose within the limits and a finite objective."""
         problem, seen = small(), list[Iteration]()
-        solution = solver.solve(problem, options, seen.append)
+        solution = solver.solve(problem, replace(options, watch=seen.append))
         assert [iteration.number for iteration in seen] == list(range(1, len(seen) + 1))
         assert len(seen) == len(solution.trace) > 0
         lower, upper = problem.limits_of_theta
@@ -163,21 +165,29 @@ class SolverContract(Contract):
 
     @pytest.mark.parametrize("stop_at", [1, 4])
     def test_s10_stops_within_one_iteration(self, solver: PoseSolver, options: SolveOptions, stop_at: int) -> None:
-        """A callback that answers true is not called again, and the status is CANCELLED with the best pose."""
-        calls = list[float]()
+        """What raises Cancelled is not called again, and the status is CANCELLED with the best pose."""
+        for told in (False, True):
+            calls = list[int]()
 
-        def cancel(iteration: Iteration) -> bool:
-            calls.append(iteration.value)
-            return len(calls) >= stop_at
+            def cancel(*_: object, calls: list[int] = calls) -> None:
+                calls.append(len(calls) + 1)
+                if len(calls) >= stop_at:
+                    raise Cancelled("the test has seen enough.")
 
-        solution = solver.solve(small(), options, cancel)
-        assert len(calls) == stop_at
-        assert solution.status is SolveStatus.CANCELLED
-        assert solution.value <= solution.start_value
+            watched = options if told else replace(options, watch=cancel)
+            solution = solver.solve(small(), watched, CallbackProgress(cancel) if told else NO_PROGRESS)
+            assert len(calls) == stop_at
+            assert solution.status is SolveStatus.CANCELLED
+            assert solution.value <= solution.start_value
 
     def test_s11_watching_changes_nothing(self, solver: PoseSolver, options: SolveOptions) -> None:
-        """A callback does not change the answer."""
-        watched = solver.solve(small(2), options, lambda _: None)
+        """Neither `watch` nor progress changes the result; what is told rises from 0 to at most 1."""
+        told = list[float | None]()
+        progress = CallbackProgress(lambda fraction, _: told.append(fraction))
+        watched = solver.solve(small(2), replace(options, watch=lambda _: True), progress)
+        known = [fraction for fraction in told if fraction is not None]
+        assert len(told) > 0
+        assert all(0.0 <= one <= other <= 1.0 for one, other in itertools.pairwise([*known, 1.0]))
         assert np.array_equal(watched.theta, solver.solve(small(2), options).theta)
 
     def test_s12_moves_only_what_is_free(self, solver: PoseSolver, options: SolveOptions) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused
+from contact_core.errors import Cancelled, FileRefused
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.placement import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
@@ -479,12 +479,43 @@ class TestCountsPixelsFromTheBottom(Mutant, OnMemory):
             return super().rays(np.asarray(pixels, float) * [1, -1] + [0, self.viewport[1]])
 
 
-class TestNeverAnswersProgress(Mutant, OnMemory):
+class TestCancelsUnasked(Mutant, OnMemory):
     breaks = "H33"
+    consequences = ("H35",)
 
     class Host(MemoryHost):
-        def progress(self, fraction: float, text: str) -> Any:
-            super().progress(fraction, text)
+        def tell(self, fraction: float | None, text: str) -> None:
+            super().tell(fraction, text)
+            raise Cancelled("nobody asked.")
+
+
+class TestKnowsNoUnknownFraction(Mutant, OnMemory):
+    breaks = "H33"
+    consequences = ("H35",)
+
+    class Host(MemoryHost):
+        def tell(self, fraction: float | None, text: str) -> None:
+            super().tell(round(fraction, 2), text)  # type: ignore[arg-type]
+
+
+class TestDoesNotCancel(Mutant, OnMemory):
+    breaks = "H35"
+
+    class Host(MemoryHost):
+        def cancel(self) -> None:
+            pass
+
+
+class TestCancelsForEver(Mutant, OnMemory):
+    breaks = "H35"
+
+    class Host(MemoryHost):
+        def tell(self, fraction: float | None, text: str) -> None:
+            try:
+                super().tell(fraction, text)
+            except Cancelled:
+                self.cancel()
+                raise
 
 
 class TestWritesWithoutUnits(Mutant, OnMemory):

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from contact_core.errors import Cancelled
+from contact_core.progress import NO_PROGRESS, CallbackProgress, Progress
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions, SolveStatus
+from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 from contact_core.testing.mutants import Mutant
 from contact_core.testing.solver_contract import SolverContract
 
@@ -25,7 +28,7 @@ class Overstepping(Sound):
     """Leaves the limits by a hair."""
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         solution = super().solve(problem, options, progress)
         theta = solution.theta * (1.0 + 1e-9)
@@ -36,7 +39,7 @@ class Forgetful(Sound):
     """Answers somewhere near the start, which need not be better."""
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         solution = super().solve(problem, options, progress)
         lower, upper = problem.limits_of_theta
@@ -50,7 +53,7 @@ class Boastful(Sound):
     """Says it settled whatever happened."""
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         solution = super().solve(problem, options, progress)
         stopped = solution.status is SolveStatus.STOPPED
@@ -63,7 +66,7 @@ class Moody(Sound):
     calls = itertools.count(1)
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         solution = super().solve(problem, options, progress)
         return replace(solution, trace=(*solution.trace, float(next(self.calls))))
@@ -73,18 +76,29 @@ class Deaf(Sound):
     """Does not hear a cancel."""
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
-        if progress is None:
-            return super().solve(problem, options)
-        return super().solve(problem, options, lambda seen: (progress(seen), False)[1])
+        def tell(fraction: float | None, text: str) -> None:
+            with contextlib.suppress(Cancelled):
+                progress.tell(fraction, text)
+
+        return super().solve(problem, options, CallbackProgress(tell))
+
+
+class Receding(Sound):
+    """Tells of progress that goes back."""
+
+    def solve(
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
+    ) -> PoseSolution:
+        return super().solve(problem, options, progress.part(1.0, 0.0))
 
 
 class Presuming(Sound):
     """Moves what is held."""
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         return super().solve(replace(problem, held=None), options, progress)
 
@@ -129,6 +143,14 @@ class TestDeaf(Mutant, SolverContract):
     @pytest.fixture
     def solver(self) -> PoseSolver:
         return Deaf()
+
+
+class TestReceding(Mutant, SolverContract):
+    breaks = "S11"
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Receding()
 
 
 class TestPresuming(Mutant, SolverContract):

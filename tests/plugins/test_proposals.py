@@ -18,6 +18,7 @@ from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
 from contact_core.proposals.proposal import Proposal, ProposalSettings
 from contact_core.rig.rig import Rig
+from contact_core.scene.memory_host import MemoryHost
 from contact_core.session import DocumentChanged, Session
 from contact_core.solve.solver import PoseSolution
 from contact_core.testing import meshes, rigs
@@ -167,8 +168,10 @@ def test_a_proposal_for_an_older_document_is_refused(session: Session) -> None:
 def test_refusals(session: Session) -> None:
     with pytest.raises(InvalidInput, match="pair"):
         Session(discover=False).slide()
+    host = MemoryHost()
+    host.cancel()
     with pytest.raises(Cancelled):
-        session.slide(settings=ProposalSettings(progress=lambda seen: True))
+        session.slide(settings=ProposalSettings(progress=host))
     before = session.document
     with pytest.raises(InvalidInput):
         session.settle(settings=ProposalSettings(solver="none such"))

@@ -18,6 +18,7 @@ from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import perform
 from contact_core.plugins.manager import PluginManager
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.depth_bound import DepthBound, measured
 from contact_core.proposals.draft import Draft
 from contact_core.proposals.proposal import ProposalSettings, slide
@@ -26,7 +27,7 @@ from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import Allowance, NoDeeperTerm
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, PoseSolver, Progress, SolveOptions
+from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions
 from contact_core.solve.terms import PoseTerm
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import TermContract
@@ -134,7 +135,7 @@ class ThroughWalls:
     summary = "Leaves out what keeps skin outside."
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         if any(term.name == "no deeper" for term in problem.terms):
             kept = tuple(term for term in problem.terms if term.name not in ("penetration", "no deeper"))

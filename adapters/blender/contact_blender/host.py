@@ -18,7 +18,7 @@ from contact_blender.ids import ObjectIds
 from contact_blender.undo import UndoBridge
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused, InvalidInput
+from contact_core.errors import Cancelled, FileRefused, InvalidInput
 from contact_core.geometry.placement import Placement, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
@@ -26,7 +26,7 @@ from contact_core.scene.host import (
     Display,
     DocumentStorage,
     PoseWriting,
-    Progress,
+    ProgressDisplay,
     RigReading,
     SceneObject,
     SceneReading,
@@ -54,7 +54,15 @@ class _KnownRig:
 
 
 class BlenderHost(
-    SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStorage, Undo, SelectionReading, Display, Progress
+    SceneReading,
+    SceneWriting,
+    RigReading,
+    PoseWriting,
+    DocumentStorage,
+    Undo,
+    SelectionReading,
+    Display,
+    ProgressDisplay,
 ):
     """The scene of Blender's window, or of the bpy module. Ids are the names under which objects were first seen.
 
@@ -75,6 +83,7 @@ class BlenderHost(
         self._ids = ObjectIds()
         self._undo = UndoBridge()
         self._overlay: Overlay | None = None
+        self._cancel_asked = False
         self._known: dict[str, _KnownRig] = {}
         storage.restore_ids(bpy.context.scene, self._ids)
 
@@ -237,15 +246,23 @@ class BlenderHost(
             self._overlay = Overlay()
         self._overlay.show(picture)
 
-    def progress(self, fraction: float, text: str) -> bool:
-        """Blender's progress cursor. A cancel key is heard only by a modal operator, so this never says so."""
+    def tell(self, fraction: float | None, text: str) -> None:
+        """Blender's progress cursor. Only a modal operator hears a key: it calls `cancel`."""
+        asked, self._cancel_asked = self._cancel_asked, False
         manager = bpy.context.window_manager
+        if asked:
+            manager.progress_end()
+            raise Cancelled("it was cancelled in Blender.")
+        if fraction is None:
+            return
         if fraction <= 0.0:
             manager.progress_begin(0.0, 1.0)
         manager.progress_update(min(max(fraction, 0.0), 1.0))
         if fraction >= 1.0:
             manager.progress_end()
-        return True
+
+    def cancel(self) -> None:
+        self._cancel_asked = True
 
     # Resolving: for the length of one call
 

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from contact_core.progress import Progress
+
 _MOST_FRAMES = 100_000  # in one range: an hour at 24 frames a second
 
 
@@ -151,7 +153,7 @@ def _transfer(arguments: argparse.Namespace) -> int:
 
     document = shots.read_contacts(arguments.source)
     wanted = dict(arguments.surface)
-    return _each_shot(arguments, lambda path, out: shots.transfer(document, path, wanted, out))
+    return _each_shot(arguments, lambda path, out, _: shots.transfer(document, path, wanted, out))
 
 
 def _solve(arguments: argparse.Namespace) -> int:
@@ -159,11 +161,16 @@ def _solve(arguments: argparse.Namespace) -> int:
     from contact_usd import shots
 
     solver = arguments.plugins.get(POSE_SOLVERS, arguments.solver)
-    wanted, tell = dict(arguments.surface), arguments.output.progress
-    return _each_shot(arguments, lambda path, out: shots.solve(path, arguments.frames, solver, wanted, out, tell))
+    wanted = dict(arguments.surface)
+    return _each_shot(
+        arguments, lambda path, out, part: shots.solve(path, arguments.frames, solver, wanted, out, part)
+    )
 
 
-def _each_shot(arguments: argparse.Namespace, work: Callable[[Path, Path | None], dict[str, object]]) -> int:
+Work = Callable[[Path, Path | None, Progress], dict[str, object]]
+
+
+def _each_shot(arguments: argparse.Namespace, work: Work) -> int:
     """One bad shot stops no other: it is told, and the exit code is 1."""
     from contact_core.errors import ContactError
 
@@ -171,12 +178,13 @@ def _each_shot(arguments: argparse.Namespace, work: Callable[[Path, Path | None]
     lines = []
     written: dict[Path, Path] = {}  # the shot behind each place in which layers are written
     for number, path in enumerate(arguments.shots):
-        arguments.output.progress(number / len(arguments.shots), path.name)
+        part = arguments.output.part(number / len(arguments.shots), (number + 1) / len(arguments.shots), path.name)
+        part.tell(0.0, "")
         name = f"{path.stem.removesuffix('.contact')}.contact.usda"
         out = None if arguments.out is None else arguments.out / name
         try:
             _check_alone(path, written.setdefault((out or path.with_name(name)).absolute(), path), name)
-            facts = work(path, out)
+            facts = work(path, out, part)
         except ContactError as error:
             results.append({"shot": str(path), "failed": str(error)})
             lines.append(f"! {path}: {error}")

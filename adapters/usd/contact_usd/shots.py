@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from contact_core.document.asset import Asset
 from contact_core.document.document import ContactDocument, Surface
 from contact_core.edit.pose_problem import pose_problem
 from contact_core.errors import FileRefused, InvalidInput
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.session import Session
 from contact_core.solve.body import Body
 from contact_core.solve.problem import PoseProblem
@@ -23,7 +23,6 @@ from contact_usd.host import UsdHost
 from contact_usd.stage_io import SUFFIXES
 
 KEY = "host.usd"  # the document's extras: the prim behind each surface
-Tell = Callable[[float, str], bool | None]
 
 
 @dataclass
@@ -144,7 +143,7 @@ def solve(
     solver: PoseSolver,
     wanted: Mapping[str, str],
     out: Path | None,
-    tell: Tell | None = None,
+    progress: Progress = NO_PROGRESS,
 ) -> dict[str, object]:
     """Solve the pairs of a shot at frames, key the rigs there and save it; facts for the report.
 
@@ -155,11 +154,7 @@ def solve(
             raise InvalidInput(f"{path} has no contact pairs, so there is nothing to solve.")
         times: list[float | None] = list(frames) if frames is not None else [None]
         problems = ((0.0 if frame is None else frame, _problem(shot, frame)) for frame in times)
-        counter = itertools.count()
-        report = (
-            None if tell is None else (lambda seen: tell(0.0, f"{path.name}: iteration {next(counter)}") is False)
-        )
-        solved = solve_sequence(solver, problems, progress=report)
+        solved = solve_sequence(solver, problems, progress=progress, count=len(times))
         if solved.solutions:  # else it was cancelled before the first
             _write(shot, times, solved)
             shot.host.save(out)

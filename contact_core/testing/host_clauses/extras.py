@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from contact_core.document.asset import Asset
-from contact_core.errors import InvalidInput
+from contact_core.errors import Cancelled, InvalidInput
 from contact_core.geometry.raycast import Locator
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.solver import SolveStatus
+from contact_core.testing import rigs
 from contact_core.testing.contract import needs
 from contact_core.testing.host_checks import ACCURACY, object_id, picture_of
 from contact_core.testing.host_clauses.ground import HostGround
@@ -58,10 +61,15 @@ class ExtraClauses(HostGround):
         assert above @ picture.up > below @ picture.up
 
     @needs("progress")
-    def test_h33_progress_asks_to_go_on(self, host: Any) -> None:
-        """Telling progress changes nothing in the scene and answers whether to go on."""
+    def test_h33_telling_changes_nothing(self, host: Any) -> None:
+        """Telling progress, a fraction or none, changes nothing: neither the scene nor a solve that tells it."""
         before = self.scene_state(host)
-        assert all(host.progress(fraction, "solving") is True for fraction in (0.0, 0.5, 1.0))
+        for fraction in (0.0, None, 0.5, 1.0):
+            host.tell(fraction, "solving")
+        problem = rigs.planted(rigs.tentacle(3), 0, contacts=30)[0]
+        told = LevenbergMarquardt().solve(problem, None, host)
+        untold = LevenbergMarquardt().solve(problem)
+        assert (told.status, told.trace) == (untold.status, untold.trace)
         assert self.scene_state(host) == before
 
     @needs("writing")
@@ -80,3 +88,16 @@ class ExtraClauses(HostGround):
         order = [again.rig.joint_index(name) for name in rig.joints]
         np.testing.assert_allclose(again.rig.rest_world[order], rig.rest_world, atol=1e-5)
         np.testing.assert_allclose(again.mesh.points, rig.surface.points, atol=1e-5)
+
+    @needs("progress")
+    def test_h35_cancel_stops_what_runs(self, host: Any) -> None:
+        """After `cancel` the next thing told raises Cancelled, once; a solve ends with its best pose."""
+        problem = rigs.planted(rigs.tentacle(3), 0, contacts=30)[0]
+        host.cancel()
+        stopped = LevenbergMarquardt().solve(problem, None, host)
+        assert stopped.status is SolveStatus.CANCELLED and len(stopped.trace) == 1
+        assert stopped.value <= stopped.start_value
+        host.tell(0.5, "the next work")
+        host.cancel()
+        with pytest.raises(Cancelled):
+            host.part(0.2, 0.6, "a part").tell(None, "solving")

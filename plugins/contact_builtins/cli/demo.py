@@ -27,6 +27,6 @@ class Demo:
             return 0
         name = DEFAULT if arguments.demo is None else arguments.demo
         out = arguments.out or Path("contact-demo") / name
-        result = run_demo(name, out, plugins=arguments.plugins, progress=arguments.output.progress)
+        result = run_demo(name, out, plugins=arguments.plugins, progress=arguments.output)
         tell(result, arguments.output)
         return 0

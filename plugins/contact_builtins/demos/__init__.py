@@ -9,8 +9,9 @@ from contact_core.errors import InvalidInput
 from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import run
-from contact_core.job.workpiece import JobProgress, JobResult
+from contact_core.job.workpiece import JobResult
 from contact_core.plugins.manager import PluginManager
+from contact_core.progress import NO_PROGRESS, Progress
 
 DEFAULT = "mug"
 
@@ -29,7 +30,7 @@ def demo_recipe(name: str = DEFAULT) -> Recipe:
 
 
 def run_demo(
-    name: str, out: Path | str, *, plugins: PluginManager | None = None, progress: JobProgress | None = None
+    name: str, out: Path | str, *, plugins: PluginManager | None = None, progress: Progress = NO_PROGRESS
 ) -> JobResult:
     """Run a demo and write its results into `out`. Raises ContactError."""
     return run(demo_recipe(name), out, plugins=plugins, progress=progress)

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from contact_core.arrays import FloatArray
-from contact_core.errors import InvalidInput, MissingExtra
+from contact_core.errors import Cancelled, InvalidInput, MissingExtra
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.solve.candidates import starting_thetas
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.solver import PoseSolution, Run, SolveOptions, SolveStatus, unsolvable
 from contact_core.solve.threads import one_blas_thread
 
 
@@ -29,7 +30,7 @@ class NLoptSolver:
     summary = "NLopt with the algorithm of your choice; slower than the default, for comparison."
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         nlopt = _nlopt()
         options = options or SolveOptions(max_iterations=2000)
@@ -38,7 +39,7 @@ class NLoptSolver:
         if paper:
             problem = replace(problem, form="paper")
             options = replace(options, candidates=("current",), max_iterations=min(options.max_iterations, 100))
-        run = Run(self.name, problem, progress)
+        run = Run(self.name, problem, options, progress)
         stopped = unsolvable(run)
         if stopped is not None:
             return stopped
@@ -65,7 +66,7 @@ def _descend(
             gradient[:] = problem.gradient(state) * scale
         try:
             run.iteration()
-        except Stop:  # an exception would be lost on its way through NLopt
+        except Cancelled:  # an exception would be lost on its way through NLopt
             cancelled = True
             optimizer.force_stop()
         return value

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.errors import InvalidInput
+from contact_core.errors import Cancelled, InvalidInput
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.solve.candidates import fitted
 from contact_core.solve.levenberg_marquardt import Descent, LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.solver import PoseSolution, Run, SolveOptions, SolveStatus, unsolvable
 from contact_core.solve.stages import Stage, solve_stages
 from contact_core.solve.threads import one_blas_thread
 
@@ -27,7 +28,7 @@ class StagedSolver:
     summary = "Levenberg-Marquardt in stages, each with its own free joints, contacts and prior."
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
         options.check_settings(self.name, ("stages",))
@@ -48,7 +49,7 @@ class ProgressiveSolver:
     summary = "Levenberg-Marquardt with contacts added along the chain; for tentacles and long wraps."
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
         options.check_settings(self.name, ("steps",))
@@ -83,16 +84,16 @@ class MultiStartSolver:
     summary = "Levenberg-Marquardt from many random starts; the best known objective, for benchmarks."
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
         options.check_settings(self.name, ("starts",))
         with one_blas_thread():
             return self._solve(problem, options, progress)
 
-    def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress | None) -> PoseSolution:
+    def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress) -> PoseSolution:
         starts = int(options.more.get("starts", 32))
-        run = Run(self.name, problem, progress)
+        run = Run(self.name, problem, options, progress, budget=starts * options.max_iterations)
         stopped = unsolvable(run)
         if stopped is not None:
             return stopped
@@ -107,7 +108,7 @@ class MultiStartSolver:
                 if descent.value < best:
                     best = descent.value
                     status = SolveStatus.CONVERGED if descent.settled else SolveStatus.STOPPED
-        except Stop:
+        except Cancelled:
             status = SolveStatus.CANCELLED
         return run.solution(status)
 

@@ -22,6 +22,7 @@ from contact_core.job.run import perform, run, target
 from contact_core.job.scene import posed_skin
 from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
+from contact_core.progress import CallbackProgress
 from contact_core.scene.picture import Picture
 from contact_core.testing.meshes import icosphere, torus
 
@@ -122,7 +123,8 @@ def test_a_job_writes_its_files_and_they_can_be_read_again(tmp_path: Path) -> No
     sketch = Sketch()
     manager = with_renderers(Broken(), sketch)
     told: list[tuple[float, str]] = []
-    result = run(demo_recipe("alien"), tmp_path / "out", plugins=manager, progress=lambda f, t: told.append((f, t)))
+    progress = CallbackProgress(lambda fraction, text: told.append((fraction or 0.0, text)))
+    result = run(demo_recipe("alien"), tmp_path / "out", plugins=manager, progress=progress)
     names = {"document.json", "pose.json", "posed.glb", "picture.png", "report.json"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == names == {p.name for p in result.files.values()}
     report = json.loads((tmp_path / "out" / "report.json").read_text())
@@ -170,14 +172,18 @@ def test_the_same_recipe_gives_the_same_bytes(tmp_path: Path) -> None:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
-@pytest.mark.parametrize("stop", [0.0, 0.3, 0.45])
+@pytest.mark.parametrize("stop", [0.0, 0.3, 0.45, 0.5, 1.0])
 def test_cancelling_writes_nothing(tmp_path: Path, stop: float) -> None:
+    def watch(fraction: float | None, _: str) -> None:
+        if fraction is None or fraction >= stop:
+            raise Cancelled("enough")
+
     with pytest.raises(Cancelled, match="nothing was written"):
         run(
             demo_recipe("alien"),
             tmp_path / "out",
             plugins=with_renderers(Sketch()),
-            progress=lambda fraction, _: fraction < stop,
+            progress=CallbackProgress(watch),
         )
     assert not (tmp_path / "out").exists()
 
@@ -264,9 +270,15 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(tmp_path: Path)
     (tmp_path / "taken").write_text("mine")
     (tmp_path / "out" / "report.json").mkdir(parents=True)
     told: list[str] = []
+    progress = CallbackProgress(lambda _, text: told.append(text))
     for out, says in (("taken", "is not a folder"), ("taken/below", "is not a folder"), ("out", "it is a folder")):
         with pytest.raises(FileRefused, match=says):
-            run(demo_recipe("alien"), tmp_path / out, plugins=plugins(), progress=lambda _, text: told.append(text))
+            run(
+                demo_recipe("alien"),
+                tmp_path / out,
+                plugins=plugins(),
+                progress=progress,
+            )
     assert not told and (tmp_path / "taken").read_text() == "mine"
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["report.json"]
 

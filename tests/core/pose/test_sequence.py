@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact_core.errors import InvalidInput
+from contact_core.errors import Cancelled, InvalidInput
+from contact_core.progress import CallbackProgress
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.sequence import solve_sequence
-from contact_core.solve.solver import Iteration
 from contact_core.testing import rigs
 
 
@@ -42,13 +42,15 @@ def test_each_frame_is_met_and_follows_the_last() -> None:
 
 
 def test_a_stopped_sequence_keeps_what_is_done() -> None:
-    seen = list[int]()
+    told = list[float | None]()
 
-    def stop(iteration: Iteration) -> bool:
-        seen.append(iteration.number)
-        return seen.count(1) >= 3
+    def stop(fraction: float | None, text: str) -> None:
+        told.append(fraction)
+        if text.startswith("frame 2"):
+            raise Cancelled("two are enough.")
 
-    solved = solve_sequence(LevenbergMarquardt(), moving(6), progress=stop)
+    solved = solve_sequence(LevenbergMarquardt(), moving(6), progress=CallbackProgress(stop))
     assert len(solved.frames) == 2
+    assert told == sorted(told, key=lambda fraction: fraction or 0.0) and 1 / 3 < (told[-1] or 0.0) < 1 / 2
     with pytest.raises(InvalidInput, match="rise"):
         solve_sequence(LevenbergMarquardt(), [*moving(2), *moving(1)])

@@ -4,8 +4,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from contact_core.arrays import FloatArray
+from contact_core.errors import Cancelled
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolution, Progress, Run, SolveOptions, SolveStatus, Stop, unsolvable
+from contact_core.solve.solver import PoseSolution, Run, SolveOptions, SolveStatus, unsolvable
 
 
 class LBFGSB:
@@ -13,11 +15,11 @@ class LBFGSB:
     summary = "SciPy's L-BFGS-B, started from the current pose"
 
     def solve(
-        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress | None = None
+        self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions(max_iterations=2000)
         options.check_settings(self.name)
-        run = Run(self.name, problem, progress)
+        run = Run(self.name, problem, options, progress)
         stopped = unsolvable(run)
         if stopped is not None:
             return stopped
@@ -38,6 +40,6 @@ class LBFGSB:
                 callback=lambda _: run.iteration(),
                 options={"maxiter": options.max_iterations, "ftol": 1e-3 * options.tolerance, "gtol": 0.0},
             )
-        except Stop:
+        except Cancelled:
             return run.solution(SolveStatus.CANCELLED)
         return run.solution(SolveStatus.CONVERGED if found.status == 0 else SolveStatus.STOPPED)
