@@ -21,6 +21,10 @@ class FileRefused(ContactError):
     """A file that cannot be read or written: unknown format, damage, a newer schema, no room."""
 
 
+class EditedFile(FileRefused):
+    """A document whose digest does not fit its content: damaged, or edited by hand; says how to accept it."""
+
+
 class CommandRejected(ContactError):
     """An edit that does not apply to this document; the document is unchanged."""
 

@@ -29,6 +29,7 @@ _OWN = (
     "contact_core.cli.edits:History",
     "contact_core.cli.edits:Replay",
     "contact_core.cli.edits:Diff",
+    "contact_core.cli.edits:Accept",
     "contact_core.cli.plugins:Plugins",
     "contact_core.cli.new_plugin:NewPlugin",
     "contact_core.cli.warm_up:WarmUp",

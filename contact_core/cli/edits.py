@@ -1,4 +1,4 @@
-"""`contact history`, `contact replay`, `contact diff`: what was done to a document, in the artist's words."""
+"""`contact history`, `replay`, `diff` and `accept`: what was done to a document, in the artist's words."""
 
 from __future__ import annotations
 
@@ -56,3 +56,18 @@ class Diff:
         lines = diff_lines(arguments.before, arguments.after)
         arguments.output.answer({"changes": lines}, "\n".join(lines) or "nothing changed")
         return int(bool(lines))
+
+
+class Accept:
+    name = "accept"
+    summary = "accept a document that was edited by hand: check it, and state its digest anew"
+
+    def configure(self, parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("file", type=Path, metavar="FILE", help="the document")
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        from contact_core.edit.recovery import accept_file
+
+        digest = accept_file(arguments.file)
+        arguments.output.answer({"file": str(arguments.file), "digest": digest}, f"accepted {arguments.file}")
+        return 0

@@ -1,7 +1,8 @@
-"""The document as JSON: a schema name and a version, the same bytes for the same document, upgrades, checks."""
+"""The document as JSON: a schema name, a version, a digest, equal bytes for equal documents, upgrades, checks."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -14,10 +15,11 @@ from contact_core.contact.shape import PatchShape
 from contact_core.document.codec import Fragment, from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, Patch, is_name
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.errors import FileRefused
+from contact_core.errors import EditedFile, FileRefused
 
 SCHEMA = "contact-core.document"
 VERSION = 1
+DIGEST = "digest"
 MAX_BYTES = 1 << 30
 
 # From each released version to the next: data of version k -> data of version k + 1. Nothing else reads old files.
@@ -41,16 +43,43 @@ def document_from_json(data: Any, source: str = "the document") -> ContactDocume
 def dump_document(document: ContactDocument) -> bytes:
     """UTF-8 JSON, made for review: sorted, one item a line. Equal documents give equal bytes.
 
-    A host stores this after each edit, and an edit changes one shape at most, so the text of shapes is kept.
+    The first line says the digest of all others, so that a damaged file is never read as another document.
     """
-    shapes = {key: _shape_text(shape) for key, shape in document.shapes.items()}
-    data = document_to_json(replace(document, shapes=FrozenMap()))
-    return (pretty(data | {"shapes": shapes}) + "\n").encode()
+    content = _content(document)
+    return b'{\n "digest": "%b",\n' % _digest(content).encode() + content.removeprefix(b"{\n")
+
+
+def document_digest(document: ContactDocument) -> str:
+    """The identity of a document's content: SHA-256, 64 hex digits.
+
+    It is taken over the bytes that `dump_document` writes, without the line that states the digest itself. So two
+    documents have the same digest exactly when a saved file of one is, byte for byte, a saved file of the other:
+    all surfaces, patches, shapes, pairs, groups, poses and extras, the schema name and its version count; the path,
+    the revision, the history and the layout of a file do not. It is the same in every process, on every platform,
+    until the version of the schema rises. It does not identify a history: two histories may lead to one document.
+    """
+    return _digest(_content(document))
 
 
 def parse_document(text: bytes, source: str = "the document") -> ContactDocument:
-    """The document in UTF-8 JSON. Raises FileRefused."""
-    return document_from_json(parse_json(text, source), source)
+    """The document in UTF-8 JSON. Raises FileRefused, EditedFile where only the digest does not fit the content.
+
+    The layout of the text does not matter. A digest of null says that nothing is known: such a file is believed.
+    """
+    data = parse_json(text, source)
+    stated = data.pop(DIGEST, "") if isinstance(data, dict) else ""
+    document = document_from_json(data, source)
+    if stated is not None and stated != _digest(_without_digest(text)) and stated != _digest(_canonical(data)):
+        raise EditedFile(_disbelief(source, bool(stated)))
+    return document
+
+
+def parse_edited(text: bytes, source: str = "the document") -> ContactDocument:
+    """The document in a file that was edited by hand, whose digest is not asked. Raises FileRefused."""
+    data = parse_json(text, source)
+    if isinstance(data, dict):
+        data.pop(DIGEST, None)
+    return document_from_json(data, source)
 
 
 def same_documents(a: ContactDocument, b: ContactDocument) -> bool:
@@ -173,6 +202,38 @@ def _cycles(document: ContactDocument) -> Iterator[str]:
             if at in line:
                 yield f"patch {at!r} hangs on itself through {next(reversed(line))!r}."
         sound.update(line)
+
+
+def _content(document: ContactDocument) -> bytes:
+    """The canonical bytes of a document, without a digest.
+
+    A host stores them after each edit, and an edit changes one shape at most, so the text of shapes is kept.
+    """
+    shapes = {key: _shape_text(shape) for key, shape in document.shapes.items()}
+    return _canonical(document_to_json(replace(document, shapes=FrozenMap())) | {"shapes": shapes})
+
+
+def _canonical(data: Any) -> bytes:
+    return (pretty(data) + "\n").encode()
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _disbelief(source: str, has_digest: bool) -> str:
+    trouble = "its digest does not fit its content" if has_digest else "it states no digest"
+    return (
+        f"{source} is not as it was saved: {trouble}, so it is damaged or was edited by other means. If the change"
+        f" was meant, `contact accept FILE` states the digest anew; if not, bring back an older copy of the file,"
+        f" or write what its journal holds: `contact replay FILE.journal --out NEW`. The file is left untouched."
+    )
+
+
+def _without_digest(text: bytes) -> bytes:
+    """The bytes that the digest was taken over, if the file is as `dump_document` wrote it."""
+    lines = text.split(b"\n", 2)
+    return lines[0] + b"\n" + lines[2] if len(lines) == 3 and lines[1].startswith(b' "digest": ') else text
 
 
 _shape_texts: WeakKeyDictionary[PatchShape, Fragment] = WeakKeyDictionary()

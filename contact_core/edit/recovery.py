@@ -9,10 +9,10 @@ from pathlib import Path
 
 from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
-from contact_core.document.schema import MAX_BYTES, dump_document, parse_document, same_documents
+from contact_core.document.schema import MAX_BYTES, dump_document, parse_document, parse_edited, same_documents
 from contact_core.edit.history import History
 from contact_core.edit.journal import Journal, JournalContents, read_journal, replay
-from contact_core.errors import FileRefused
+from contact_core.errors import EditedFile, FileRefused
 from contact_core.whole_file import read_whole, write_whole
 
 
@@ -48,6 +48,21 @@ def write_document(path: Path, document: ContactDocument) -> str:
     raw = dump_document(document)
     write_whole(path, raw)
     return file_digest(raw)
+
+
+def accept_file(path: Path) -> str:
+    """State the digest of a document file that was edited by hand anew; returns it.
+
+    Raises FileRefused where it is no document, cannot be written, or another session has it open.
+    """
+    lock = DocumentLock.take(path) if path.exists() else None
+    if isinstance(lock, str):
+        raise FileRefused(f"cannot accept {path}: {lock}.")
+    try:
+        return write_document(path, parse_edited(read_whole(path, MAX_BYTES), str(path)))
+    finally:
+        if lock is not None:
+            lock.release()
 
 
 def file_digest(raw: bytes) -> str:
@@ -111,8 +126,8 @@ def _open_locked(path: Path, lock: DocumentLock) -> OpenedFile:
         if path.exists():
             document, digest = read_document(path)
     except FileRefused as error:
-        if old is None or "newer contact-core" in str(error):
-            raise
+        if old is None or isinstance(error, EditedFile) or "newer contact-core" in str(error):
+            raise  # what can be read is somebody's edit, perhaps
         notes.append(f"{error} It is kept as {_keep(path, 'damaged').name}; the journal holds the document.")
         return _resume(path, lock, old, None, None, notes)
     if old is not None and not old.closed and _belongs(old, document, digest):

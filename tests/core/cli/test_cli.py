@@ -45,7 +45,18 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
     text = capsys.readouterr().out
-    for name in ("pose", "inspect", "samples", "history", "replay", "diff", "plugins", "new-plugin", "warm-up"):
+    for name in (
+        "pose",
+        "inspect",
+        "samples",
+        "history",
+        "replay",
+        "diff",
+        "accept",
+        "plugins",
+        "new-plugin",
+        "warm-up",
+    ):
         assert f"\n    {name} " in text or f"\n    {name}\n" in text, name
 
 

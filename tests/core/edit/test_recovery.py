@@ -13,12 +13,13 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from contact_core.cli import main
 from contact_core.document.document import ContactDocument
 from contact_core.document.schema import document_to_json, dump_document
 from contact_core.edit.commands import SetExtra
 from contact_core.edit.history import History
 from contact_core.edit.journal import encode_line, read_journal, replay
-from contact_core.edit.recovery import journal_path, read_only_document, write_document
+from contact_core.edit.recovery import accept_file, journal_path, read_only_document, write_document
 from contact_core.errors import CommandRejected, FileRefused
 from contact_core.session import Session
 from contact_core.testing.random_commands import random_history
@@ -88,6 +89,27 @@ def test_a_damaged_document_lives_on_in_its_journal_until_it_is_saved(tmp_path: 
     session.close()
     with Session.open(path, discover=False) as sound:
         assert sound.notes == () and dict(sound.document.extras) == {"precious": 1}
+
+
+def test_an_edit_by_hand_is_no_loss(tmp_path: Path) -> None:
+    """It is refused untouched, with the journal that holds the other version, until somebody accepts it."""
+    path = tmp_path / "document.json"
+    with Session.open(path, discover=False) as session:
+        session.do(SetExtra("number", 1))
+        session.save()
+    edited = path.read_bytes().replace(b'"number": 1', b'"number": 7')
+    path.write_bytes(edited)
+    beside = kept_beside(path)
+    with pytest.raises(FileRefused, match="does not fit its content"):
+        Session.open(path, discover=False)
+    assert kept_beside(path) == beside
+    assert main(["accept", str(path)]) == 0
+    with Session.open(path, discover=False) as again:
+        assert dict(again.document.extras) == {"number": 7}
+        with pytest.raises(FileRefused, match=r"cannot accept .*is open in process"):
+            accept_file(path)
+    with pytest.raises(FileRefused, match="cannot read"):
+        accept_file(tmp_path / "nothing.json")
 
 
 def test_a_crash_between_writing_the_file_and_noting_it_keeps_the_history(tmp_path: Path) -> None:
