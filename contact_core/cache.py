@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from contact_core.atomic_file import replacing
 from contact_core.errors import FileRefused
-from contact_core.whole_file import replacing
 
 
 def cache_directory() -> Path | None:

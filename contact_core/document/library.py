@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from contact_core.atomic_file import read_bounded, write_atomic
 from contact_core.contact.placement import Link
 from contact_core.contact.shape import PatchShape
 from contact_core.document.codec import from_json, pretty, to_json
@@ -14,7 +15,6 @@ from contact_core.document.document import ContactDocument, ContactPair, Patch, 
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.schema import MAX_BYTES, inconsistencies, open_envelope, parse_json
 from contact_core.errors import FileRefused
-from contact_core.whole_file import read_whole, write_whole
 
 SCHEMA = "contact-core.contact-set"
 VERSION = 1
@@ -36,7 +36,7 @@ class ContactSet:
     groups: FrozenMap[tuple[str, ...]] = field(default_factory=FrozenMap)
 
     def parents_first(self) -> tuple[Patch, ...]:
-        """The patches so that each comes after the one it hangs on."""
+        """The patches so that each comes after its parent."""
         ordered: dict[str, Patch] = {}
         waiting = list(self.patches.values())
         while waiting:
@@ -49,15 +49,15 @@ class ContactSet:
 
 
 def save_contact_set(contact_set: ContactSet, path: Path | str) -> None:
-    """Write a set, whole or not at all. Raises FileRefused."""
+    """Write a set atomically. Raises FileRefused."""
     data = {"schema": SCHEMA, "version": VERSION, **to_json(contact_set)}
-    write_whole(path, pretty(data) + "\n")
+    write_atomic(path, pretty(data) + "\n")
 
 
 def load_contact_set(path: Path | str) -> ContactSet:
     """Read a set. Raises FileRefused for what is none, is damaged, or is newer than this release."""
     path = Path(path)
-    data = parse_json(read_whole(path, MAX_BYTES), str(path))
+    data = parse_json(read_bounded(path, MAX_BYTES), str(path))
     body = open_envelope(data, SCHEMA, VERSION, UPGRADES, str(path))
     found: ContactSet = from_json(ContactSet, body, path.name)
     document = ContactDocument(found.surfaces, found.patches, found.shapes, found.pairs, found.groups)

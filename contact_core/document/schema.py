@@ -170,10 +170,10 @@ def _patch_inconsistencies(document: ContactDocument, patch: Patch) -> Iterator[
         return
     parent = document.patches.get(place.parent)
     if parent is None:
-        yield f"patch {patch.name!r} hangs on {place.parent!r}, which does not exist."
+        yield f"patch {patch.name!r} is a child of {place.parent!r}, which does not exist."
         return
     if parent.surface != patch.surface:
-        yield f"patch {patch.name!r} hangs on {place.parent!r}, which lies on another surface."
+        yield f"patch {patch.name!r} is a child of {place.parent!r}, which lies on another surface."
     yield from _link_inconsistencies(document, patch, place, parent, shape)
 
 
@@ -182,13 +182,13 @@ def _link_inconsistencies(
 ) -> Iterator[str]:
     parent_shape = document.shapes.get(parent.shape)
     if parent_shape is not None and link.parent_point >= parent_shape.axis.point_count:
-        yield f"patch {patch.name!r} hangs on point {link.parent_point} of {parent.name!r}, past its axis."
+        yield f"patch {patch.name!r} is linked to point {link.parent_point} of {parent.name!r}, past its axis."
     if shape is not None and link.own_point >= shape.axis.point_count:
-        yield f"patch {patch.name!r} hangs by its point {link.own_point}, past its axis."
+        yield f"patch {patch.name!r} is linked by its point {link.own_point}, past its axis."
 
 
 def _cycles(document: ContactDocument) -> Iterator[str]:
-    """Patches that hang on themselves; each patch is walked over once, so that a long chain costs its length."""
+    """Patches that are their own ancestors; each is walked over once, so that a long chain costs its length."""
     sound: set[str] = set()
     for name in document.patches:
         line: dict[str, None] = {}  # in order
@@ -200,7 +200,7 @@ def _cycles(document: ContactDocument) -> Iterator[str]:
                 break
             at = placement.parent
             if at in line:
-                yield f"patch {at!r} hangs on itself through {next(reversed(line))!r}."
+                yield f"patch {at!r} is its own ancestor through {next(reversed(line))!r}."
         sound.update(line)
 
 

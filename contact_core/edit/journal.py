@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from contact_core.atomic_file import read_bounded, write_atomic
 from contact_core.document.document import ContactDocument
 from contact_core.document.schema import document_from_json, document_to_json, open_envelope
 from contact_core.edit.command import command_from_json, command_to_json
 from contact_core.edit.history import History, Step
 from contact_core.errors import ContactError, FileRefused
-from contact_core.whole_file import read_whole, write_whole
 
 SCHEMA = "contact-core.journal"
 VERSION = 1
@@ -64,7 +64,7 @@ class Journal:
         events = [_event_of(step) for step in history.steps]
         if history.can_redo:
             events.append({"goto": history.revision})
-        write_whole(path, b"".join(map(encode_line, [header, *events])))
+        write_atomic(path, b"".join(map(encode_line, [header, *events])))
         return cls(path)
 
     def did(self, step: Step) -> None:
@@ -189,7 +189,7 @@ class JournalContents:
 def read_journal(path: Path) -> JournalContents:
     """The sound part of a journal. Raises FileRefused when not even the first line is."""
     damage, records = None, []
-    for number, line in enumerate(_lines(read_whole(path, MAX_BYTES)), start=1):
+    for number, line in enumerate(_lines(read_bounded(path, MAX_BYTES)), start=1):
         event = decode_line(line)
         if event is None:
             damage = f"line {number} of {path.name} is damaged or was cut off; all before it is whole."

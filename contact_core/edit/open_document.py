@@ -75,7 +75,7 @@ class OpenDocument:
             self._journal.went(revision)
 
     def save(self, history: History) -> None:
-        """Write the current document, whole or not at all. Raises FileRefused.
+        """Write the current document atomically. Raises FileRefused.
 
         A file that something else wrote meanwhile is kept under another name, and `notes` says so.
         """

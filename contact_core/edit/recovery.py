@@ -7,13 +7,13 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from contact_core.atomic_file import read_bounded, write_atomic
 from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import MAX_BYTES, dump_document, parse_document, parse_edited, same_documents
 from contact_core.edit.history import History
 from contact_core.edit.journal import Journal, JournalContents, read_journal, replay
 from contact_core.errors import EditedFile, FileRefused
-from contact_core.whole_file import read_whole, write_whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +39,14 @@ def journal_path(path: Path) -> Path:
 
 def read_document(path: Path) -> tuple[ContactDocument, str]:
     """The document in a file and the digest of the file. Raises FileRefused."""
-    raw = read_whole(path, MAX_BYTES)
+    raw = read_bounded(path, MAX_BYTES)
     return parse_document(raw, str(path)), file_digest(raw)
 
 
 def write_document(path: Path, document: ContactDocument) -> str:
-    """Write a document whole or not at all; answers the digest of the file. Raises FileRefused."""
+    """Write a document atomically; returns its digest. Raises FileRefused."""
     raw = dump_document(document)
-    write_whole(path, raw)
+    write_atomic(path, raw)
     return file_digest(raw)
 
 
@@ -59,7 +59,7 @@ def accept_file(path: Path) -> str:
     if isinstance(lock, str):
         raise FileRefused(f"cannot accept {path}: {lock}.")
     try:
-        return write_document(path, parse_edited(read_whole(path, MAX_BYTES), str(path)))
+        return write_document(path, parse_edited(read_bounded(path, MAX_BYTES), str(path)))
     finally:
         if lock is not None:
             lock.release()
@@ -72,7 +72,7 @@ def file_digest(raw: bytes) -> str:
 
 def digest_of(path: Path) -> str | None:
     """Digest of the document file at a path, None without one. Raises FileRefused."""
-    return file_digest(read_whole(path, MAX_BYTES)) if path.exists() else None
+    return file_digest(read_bounded(path, MAX_BYTES)) if path.exists() else None
 
 
 def open_file(path: Path) -> OpenedFile:

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from contact_core._version import __version__
+from contact_core.atomic_file import write_atomic
+from contact_core.atomic_set import replacing_set
 from contact_core.document.schema import dump_document
 from contact_core.errors import ContactError
 from contact_core.job.pictures import pictures_of
@@ -18,8 +20,6 @@ from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS, RENDERERS
 from contact_core.rig.rig import Pose
 from contact_core.scene.picture import Picture
-from contact_core.whole_file import write_whole
-from contact_core.whole_set import replacing_together
 
 # What a job leaves, by role; a picture only where something can draw it.
 FILES = {
@@ -34,15 +34,15 @@ FILES = {
 def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
     """Draw and write everything. Raises FileRefused where `out` cannot be written."""
     rows = table(job.metrics, job.verdict)
-    with replacing_together(out, FILES.values()) as stage:
+    with replacing_set(out, FILES.values()) as stage:
         with job.stage("write", 0.75, "Writing the document, the pose and the model"):
-            write_whole(stage / FILES["document"], dump_document(job.session.document))
-            write_whole(stage / FILES["pose"], pose_json(job.rig.name, job.pose))
+            write_atomic(stage / FILES["document"], dump_document(job.session.document))
+            write_atomic(stage / FILES["pose"], pose_json(job.rig.name, job.pose))
             _write_model(job, stage / FILES["model"], plugins)
         with job.stage("render", 0.8, "Drawing the pictures"):
             renderer = draw(job, pictures_of(job, rows), stage / FILES["picture"], plugins)
         report = report_of(job, renderer)
-        write_whole(stage / FILES["report"], json.dumps(report, indent=2, allow_nan=False) + "\n")
+        write_atomic(stage / FILES["report"], json.dumps(report, indent=2, allow_nan=False) + "\n")
         written = {role: out / name for role, name in FILES.items() if (stage / name).exists()}
         job.progress.tell(1.0, "Finishing")  # the last moment to cancel: from here on the files are written
     return JobResult(job.recipe, report, job.verdict, written, rows)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from contact_core.atomic_set import check_writable
 from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
@@ -33,7 +34,6 @@ from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.bones import bone_segments
 from contact_core.rig.rig import Pose
 from contact_core.session import Session
-from contact_core.whole_set import check_writable
 
 
 def run_recipe(

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from contact_core.atomic_file import write_atomic
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.rig.poses import PoseKeys
 from contact_core.rig.rig import Pose
-from contact_core.whole_file import write_whole
 
 SCHEMA = 1
 LARGEST_FILE = 64_000_000  # bytes
@@ -55,8 +55,8 @@ class PoseLibrary:
 
 
 def save_pose(path: Path | str, pose: Pose, *, rig: str = "") -> None:
-    """Write a pose as JSON, whole or not at all. Raises FileRefused."""
-    write_whole(path, json.dumps({"kind": "contact.pose", "schema": SCHEMA, "rig": rig, **_plain(pose)}))
+    """Write a pose as JSON, atomically. Raises FileRefused."""
+    write_atomic(path, json.dumps({"kind": "contact.pose", "schema": SCHEMA, "rig": rig, **_plain(pose)}))
 
 
 def load_pose(path: Path | str) -> Pose:
@@ -65,9 +65,9 @@ def load_pose(path: Path | str) -> Pose:
 
 
 def save_keys(path: Path | str, keys: PoseKeys) -> None:
-    """Write keys as JSON, whole or not at all. Raises FileRefused."""
+    """Write keys as JSON, atomically. Raises FileRefused."""
     held = [{"frame": frame, **_plain(pose)} for frame, pose in zip(keys.frames, keys.poses, strict=True)]
-    write_whole(path, json.dumps({"kind": "contact.keys", "schema": SCHEMA, "rig": keys.rig, "keys": held}))
+    write_atomic(path, json.dumps({"kind": "contact.keys", "schema": SCHEMA, "rig": keys.rig, "keys": held}))
 
 
 def load_keys(path: Path | str) -> PoseKeys:

@@ -147,7 +147,7 @@ class DocumentStorage(HostAdapter, Protocol):
 
     @abstractmethod
     def save(self, path: Path | None = None) -> None:
-        """Write the scene with its document, whole or not at all; None: where it came from."""
+        """Write the scene with its document atomically; None: where it came from."""
         ...
 
 

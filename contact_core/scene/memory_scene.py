@@ -14,10 +14,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from contact_core.arrays import FloatArray, IntArray
+from contact_core.atomic_file import write_atomic
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.rig.rig import JointFreedom, Pose, Rig
 from contact_core.scene.host import SceneSpace, StoredDocument
-from contact_core.whole_file import write_whole
 
 FORMAT = "contact-core.memory-scene"
 FORMAT_VERSION = 1
@@ -123,7 +123,7 @@ def _rotation_of(matrices: FloatArray) -> FloatArray:
 
 
 def save_scene(scene: MemoryScene, path: Path) -> None:
-    """Write whole or not at all. Raises FileRefused."""
+    """Write atomically. Raises FileRefused."""
     arrays: dict[str, Any] = {}
     objects = {key: _object_to_json(f"o{k}", item, arrays) for k, (key, item) in enumerate(scene.objects.items())}
     space = scene.space
@@ -135,7 +135,7 @@ def save_scene(scene: MemoryScene, path: Path) -> None:
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     stream = io.BytesIO()
     np.savez(stream, **arrays)
-    write_whole(path, stream.getvalue())
+    write_atomic(path, stream.getvalue())
 
 
 def load_scene(path: Path) -> MemoryScene:

@@ -17,9 +17,9 @@ from typing import Literal
 
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils
 
+from contact_core.atomic_file import replacing
 from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.scene.host import SceneSpace
-from contact_core.whole_file import replacing
 
 SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
 WRITABLE = (".usda", ".usdc", ".usd")

@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
+from contact_core.atomic_file import replacing
 from contact_core.errors import FileRefused, MissingExtra
 from contact_core.scene.picture import Picture
-from contact_core.whole_file import replacing
 from contact_viewer.scene_file import write_scene
 
 _SECONDS = 180  # a picture takes 2 to 4 seconds; a hung driver must not hang the job

@@ -46,13 +46,13 @@ class GltfFiles:
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
         """One GLB with every asset; rigs as skins in their pose. Raises FileRefused, InvalidInput."""
         from contact_builtins.formats.gltf_writer import glb_bytes
-        from contact_core.whole_file import write_whole
+        from contact_core.atomic_file import write_atomic
 
         if Path(path).suffix.lower() != ".glb":
             raise FileRefused(f"{path}: glTF is written as one binary file; let its name end in .glb.")
         if not Path(path).absolute().parent.is_dir():
             raise FileRefused(f"{path} cannot be written: there is no folder {Path(path).parent}. Make it first.")
-        write_whole(path, glb_bytes(assets, poses))
+        write_atomic(path, glb_bytes(assets, poses))
 
 
 def _object_asset(path: Path, parts: list[Part], notes: list[str]) -> Asset:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from contact_core.whole_file import write_whole
+from contact_core.atomic_file import write_atomic
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -26,7 +26,7 @@ def encode_png(image: npt.NDArray[np.uint8]) -> bytes:
 
 def write_png(image: npt.NDArray[np.uint8], path: Path) -> None:
     """Write (height, width, 3) uint8 as a PNG. Raises FileRefused when the file cannot be written."""
-    write_whole(path, encode_png(image))
+    write_atomic(path, encode_png(image))
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

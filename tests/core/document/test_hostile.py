@@ -22,7 +22,7 @@ def link(parent: str) -> Data:
 
 
 def together(data: Data, parents: dict[int, int]) -> None:
-    """The k-th patch hangs on the given one; all lie on one surface."""
+    """The k-th patch is a child of the given one; all lie on one surface."""
     names = list(data["patches"])
     surface = data["patches"][names[0]]["surface"]
     for child, parent in parents.items():
@@ -44,9 +44,9 @@ def nested(levels: int) -> Any:
 
 BARYCENTRIC = [1.0, 0.0, 0.0]
 CHANGES: list[tuple[str, Change]] = [
-    ("hangs on itself", lambda d: together(d, {0: 0})),
-    ("hangs on itself", lambda d: together(d, {0: 1, 1: 0})),
-    ("hangs on itself", lambda d: together(d, {0: 1, 1: 2, 2: 3, 3: 1})),
+    ("is its own ancestor", lambda d: together(d, {0: 0})),
+    ("is its own ancestor", lambda d: together(d, {0: 1, 1: 0})),
+    ("is its own ancestor", lambda d: together(d, {0: 1, 1: 2, 2: 3, 3: 1})),
     ("which does not exist", lambda d: first(d["patches"]).update(placement=link("nobody"))),
     ("past its axis", lambda d: (together(d, {0: 1}), first(d["patches"])["placement"].update(parent_point=99))),
     ("past its axis", lambda d: (together(d, {0: 1}), first(d["patches"])["placement"].update(own_point=99))),

@@ -1,4 +1,4 @@
-"""Files that belong together come together or not at all."""
+"""A set of files is replaced as one: all of the new, or all of the old."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from contact_core.atomic_file import write_atomic
+from contact_core.atomic_set import _exclusive, check_writable, replacing_set
 from contact_core.errors import FileRefused
-from contact_core.whole_file import write_whole
-from contact_core.whole_set import _alone, check_writable, replacing_together
 
 NAMES = ("pose", "picture", "report")
 
@@ -20,7 +20,7 @@ def contents(folder: Path) -> dict[str, str]:
 
 
 def publish(folder: Path, word: str, names: tuple[str, ...] = NAMES) -> None:
-    with replacing_together(folder, NAMES) as stage:
+    with replacing_set(folder, NAMES) as stage:
         for name in names:
             (stage / name).write_text(word)
 
@@ -37,7 +37,7 @@ def test_a_set_replaces_a_set_and_touches_nothing_else(tmp_path: Path) -> None:
 def test_an_error_leaves_the_old_set_and_no_litter(event: type[BaseException], tmp_path: Path) -> None:
     publish(tmp_path / "old", "first")
     for place in ("old", "new/deep"):
-        with pytest.raises(event), replacing_together(tmp_path / place, NAMES) as stage:
+        with pytest.raises(event), replacing_set(tmp_path / place, NAMES) as stage:
             (stage / "pose").write_text("half")
             raise event
     assert contents(tmp_path / "old") == dict.fromkeys(NAMES, "first")
@@ -45,17 +45,17 @@ def test_an_error_leaves_the_old_set_and_no_litter(event: type[BaseException], t
 
 
 def test_what_fails_inside_is_told_of_the_folder_that_was_named(tmp_path: Path) -> None:
-    with pytest.raises(FileRefused) as told, replacing_together(tmp_path / "out", NAMES) as stage:
+    with pytest.raises(FileRefused) as told, replacing_set(tmp_path / "out", NAMES) as stage:
         (stage / "pose").mkdir()
-        write_whole(stage / "pose", "x")
+        write_atomic(stage / "pose", "x")
     assert str(tmp_path / "out" / "pose") in str(told.value) and ".contact-" not in str(told.value)
 
 
 def test_a_rename_that_fails_does_not_claim_that_nothing_changed(tmp_path: Path) -> None:
     publish(tmp_path, "first")
-    with pytest.raises(FileRefused, match="may be of two runs"), replacing_together(tmp_path, NAMES) as stage:
+    with pytest.raises(FileRefused, match="may be of two runs"), replacing_set(tmp_path, NAMES) as stage:
         for name in NAMES:
-            write_whole(stage / name, "second")
+            write_atomic(stage / name, "second")
         (tmp_path / "report").unlink()
         (tmp_path / "report").mkdir()  # somebody else's, in the meantime
     assert contents(tmp_path) == {"pose": "second", "picture": "second"}
@@ -65,7 +65,7 @@ def test_a_rename_that_fails_does_not_claim_that_nothing_changed(tmp_path: Path)
 def test_two_sets_at_once_never_mix(tmp_path: Path) -> None:
     """While one publishes, another waits with all of its files ready."""
     publish(tmp_path, "first")
-    with _alone(tmp_path):
+    with _exclusive(tmp_path):
         other = threading.Thread(target=publish, args=(tmp_path, "second"))
         other.start()
         other.join(0.5)

@@ -1,4 +1,4 @@
-"""Files that belong together: a folder gets all of a new set or keeps all of the old one."""
+"""Files that belong together, replaced as one: a folder holds all of the new set or all of the old one."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from contact_core.errors import FileRefused
 
 
 @contextlib.contextmanager
-def replacing_together(folder: Path, names: Collection[str]) -> Iterator[Path]:
-    """An empty folder inside `folder`; once it is filled without an error, its files have replaced those there.
+def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
+    """An empty staging folder inside `folder`; when the block ends without an error, its files replace those there.
 
     names: of all files of the set. The old ones stay as they are until the last of the new is on the disk; one
     that the new set lacks (a picture that nothing could draw) is gone afterwards. Whoever publishes at the same
@@ -31,7 +31,7 @@ def replacing_together(folder: Path, names: Collection[str]) -> Iterator[Path]:
     untouched = True
     try:
         yield stage
-        with _alone(folder):
+        with _exclusive(folder):
             written = sorted(path.name for path in stage.iterdir())
             untouched = False
             for name in written:
@@ -65,7 +65,7 @@ def check_writable(folder: Path, names: Collection[str]) -> None:
 
 
 @contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _exclusive(folder: Path) -> Iterator[None]:
     """While this holds, nobody else is in here with the same folder, where the system can lock folders (POSIX)."""
     try:
         import fcntl

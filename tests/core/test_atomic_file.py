@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Files are written atomically, and read with a bound."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from contact_core.atomic_file import replacing, write_atomic
 from contact_core.errors import FileRefused
-from contact_core.whole_file import replacing, write_whole
 
 
 def test_a_file_is_written_and_replaced_and_nothing_else_remains(tmp_path: Path) -> None:
     target = tmp_path / "new" / "report.json"
-    write_whole(target, "first")
-    write_whole(target, b"second")
+    write_atomic(target, "first")
+    write_atomic(target, b"second")
     assert target.read_bytes() == b"second"
     assert list(target.parent.iterdir()) == [target]
     plain = tmp_path / "plain"
@@ -24,7 +24,7 @@ def test_a_file_is_written_and_replaced_and_nothing_else_remains(tmp_path: Path)
 
 def test_an_error_while_writing_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
     target = tmp_path / "picture.png"
-    write_whole(target, b"old")
+    write_atomic(target, b"old")
     with pytest.raises(ZeroDivisionError), replacing(target) as temporary:
         assert temporary.suffix == ".png"
         temporary.write_bytes(b"half")
@@ -36,11 +36,11 @@ def test_an_error_while_writing_leaves_the_old_file_and_no_litter(tmp_path: Path
 def test_a_folder_that_is_a_file_is_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "folder").write_text("")
     with pytest.raises(FileRefused, match="cannot write into"):
-        write_whole(tmp_path / "folder" / "report.json", b"")
+        write_atomic(tmp_path / "folder" / "report.json", b"")
 
 
 def test_a_target_that_is_a_folder_is_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
     with pytest.raises(FileRefused, match=r"cannot write .*taken"):
-        write_whole(tmp_path / "taken", b"")
+        write_atomic(tmp_path / "taken", b"")
     assert list(tmp_path.iterdir()) == [tmp_path / "taken"]

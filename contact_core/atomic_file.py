@@ -1,5 +1,5 @@
-"""Files written whole or not at all, and read with a bound: a reader never sees half a file, a full disk never eats
-the old one, a hostile file does not fill the memory."""
+"""Atomic writes and bounded reads: a reader sees the old file or the new one, a full disk keeps the old one, and a
+hostile file does not fill the memory."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from pathlib import Path
 from contact_core.errors import FileRefused
 
 
-def read_whole(path: Path | str, most: int) -> bytes:
-    """The bytes of a plain file of at most `most` bytes. Raises FileRefused for any other."""
+def read_bounded(path: Path | str, max_bytes: int) -> bytes:
+    """The bytes of a plain file of at most `max_bytes`. Raises FileRefused for any other."""
     try:
-        with open(path, "rb", opener=_without_waiting) as stream:  # the only one with an opener
+        with open(path, "rb", opener=_open_nonblocking) as stream:  # the only one with an opener
             status = os.fstat(stream.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise FileRefused(f"cannot read {path}: it is not a plain file.")
-            if status.st_size > most:
-                raise FileRefused(f"{path} has {status.st_size} bytes; more than {most} are refused.")
+            if status.st_size > max_bytes:
+                raise FileRefused(f"{path} has {status.st_size} bytes; more than {max_bytes} are refused.")
             return stream.read()
     except OSError as error:
         raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
 
 
-def write_whole(path: Path | str, data: bytes | str) -> None:
-    """Write a file (text as UTF-8) by a temporary neighbour, fsync and rename. Raises FileRefused."""
+def write_atomic(path: Path | str, data: bytes | str) -> None:
+    """Write a file (text as UTF-8) atomically: a temporary file beside it, fsync, rename. Raises FileRefused."""
     with replacing(path) as temporary:
         temporary.write_bytes(data.encode() if isinstance(data, str) else data)
 
 
 @contextlib.contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
-    """A temporary path beside `path`, of the same suffix; whoever fills it without an error has replaced `path`.
+    """A temporary path beside `path`, of the same suffix; when the block ends without an error, it replaces `path`.
 
     For libraries that insist on writing files by name. A link stays a link, and a file that is replaced keeps its
     permissions. Raises FileRefused when the folder cannot be written.
@@ -50,7 +50,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
         raise FileRefused(f"cannot write into {path.parent}: {error.strerror or error}.") from error
     try:
         yield temporary
-        _settle(temporary, target)
+        _commit(temporary, target)
     except OSError as error:
         raise FileRefused(
             f"cannot write {path}: {error.strerror or error}. What was there before is untouched."
@@ -59,7 +59,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _settle(temporary: Path, target: Path) -> None:
+def _commit(temporary: Path, target: Path) -> None:
     """Bytes to the disk, then the name, then the folder that holds the name."""
     with temporary.open("rb+") as stream:
         os.fsync(stream.fileno())
@@ -74,6 +74,6 @@ def _settle(temporary: Path, target: Path) -> None:
             os.close(folder)
 
 
-def _without_waiting(path: str, flags: int) -> int:
+def _open_nonblocking(path: str, flags: int) -> int:
     """Opening a pipe that nobody writes to waits for ever otherwise."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
