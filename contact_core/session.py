@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from contact_core.document.document import ContactDocument
 from contact_core.edit.announcer import Announcer, DocumentChanged, Listener
 from contact_core.edit.command import Command
+from contact_core.edit.command_table import BUILT_IN_COMMANDS
 from contact_core.edit.derived import Derived
 from contact_core.edit.history import History, Step
 from contact_core.edit.open_document import OpenDocument, real_path
@@ -20,6 +21,7 @@ from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
 from contact_core.edit.under_way import UnderWay
 from contact_core.errors import CommandRejected, FileRefused
+from contact_core.plugins.registry import COMMANDS
 from contact_core.plugins.verbs import PluginVerbs
 from contact_core.proposals.verbs import ProposalVerbs
 
@@ -87,9 +89,10 @@ class Session(PluginVerbs, ProposalVerbs):
         """
         session = cls(**arguments)
         try:
-            if journal_path(real_path(Path(path))).exists():
-                session.register_commands()  # a journal may hold commands of plugins
-            session._file, session.history = OpenDocument.open(Path(path))
+            commands = BUILT_IN_COMMANDS
+            if journal_path(real_path(Path(path))).exists():  # it may hold commands of plugins
+                commands = session.plugins.offers(COMMANDS)
+            session._file, session.history = OpenDocument.open(Path(path), commands)
         except BaseException:
             session.close()
             raise

@@ -15,10 +15,9 @@ class History:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.edit.tell import history_lines
-        from contact_core.plugins.verbs import know_commands
+        from contact_core.plugins.registry import COMMANDS
 
-        know_commands(arguments.plugins)
-        lines = history_lines(arguments.file)
+        lines = history_lines(arguments.file, arguments.plugins.offers(COMMANDS))
         arguments.output.answer({"edits": lines}, "\n".join(lines) or "no edits")
         return 0
 
@@ -33,10 +32,9 @@ class Replay:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.edit.tell import replay_lines
-        from contact_core.plugins.verbs import know_commands
+        from contact_core.plugins.registry import COMMANDS
 
-        know_commands(arguments.plugins)
-        lines = replay_lines(arguments.journal, arguments.out)
+        lines = replay_lines(arguments.journal, arguments.out, arguments.plugins.offers(COMMANDS))
         written = None if arguments.out is None else str(arguments.out)
         arguments.output.answer({"told": lines, "written": written}, "\n".join(lines))
         return 0

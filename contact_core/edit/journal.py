@@ -20,7 +20,8 @@ from typing import Any
 from contact_core.atomic_file import read_bounded, write_atomic
 from contact_core.document.document import ContactDocument
 from contact_core.document.schema import document_from_json, document_to_json, open_envelope
-from contact_core.edit.command import command_from_json, command_to_json
+from contact_core.edit.command import command_to_json
+from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable, command_from_json
 from contact_core.edit.history import History, Step
 from contact_core.errors import ContactError, FileRefused
 
@@ -206,12 +207,15 @@ def read_journal(path: Path) -> JournalContents:
     return JournalContents(base, revision, digest, tuple(records[1:]), damage)
 
 
-def replay(contents: JournalContents) -> tuple[History, str | None]:
-    """The history that a journal records, and None or a sentence on the event that could not be replayed."""
+def replay(contents: JournalContents, commands: CommandTable = BUILT_IN_COMMANDS) -> tuple[History, str | None]:
+    """The history that a journal records, and None or a sentence on the event that could not be replayed.
+
+    commands: the kinds that it may hold.
+    """
     history = History(contents.base, contents.base_revision)
     for number, event in enumerate(contents.events, start=2):
         try:
-            _replay_event(history, event)
+            _replay_event(history, event, commands)
         except ContactError as error:
             return history, f"the event on line {number} cannot be replayed: {error}"
     return history, None
@@ -241,9 +245,9 @@ def _event_of(step: Step) -> dict[str, Any]:
     return {"at": step.revision, "do": command_to_json(step.command), "origin": step.origin}
 
 
-def _replay_event(history: History, event: dict[str, Any]) -> None:
+def _replay_event(history: History, event: dict[str, Any], commands: CommandTable) -> None:
     if "do" in event:
-        command = command_from_json(event["do"])
+        command = command_from_json(event["do"], commands)
         merged = bool(event.get("merged"))  # then the recorded command is the merged one
         history.do_as(command, str(event.get("origin")), _whole_number(event, "at"), merged=merged)
     elif "goto" in event:

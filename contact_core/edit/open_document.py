@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from contact_core.document.lock import DocumentLock
+from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
 from contact_core.edit.history import History, Step
 from contact_core.edit.journal import Journal
 from contact_core.edit.recovery import digest_of, journal_path, keep_foreign, open_file, set_aside, write_document
@@ -37,9 +38,9 @@ class OpenDocument:
         self._lock = lock
 
     @classmethod
-    def open(cls, path: Path) -> tuple[OpenDocument, History]:
-        """Open a path, replaying an interrupted journal. Raises FileRefused."""
-        opened = open_file(real_path(path))
+    def open(cls, path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> tuple[OpenDocument, History]:
+        """Open a path, replaying an interrupted journal of these kinds of commands. Raises FileRefused."""
+        opened = open_file(real_path(path), commands)
         document = cls(opened.path, opened.journal, opened.lock, opened.notes, opened.read_only, opened.digest)
         return document, opened.history
 

@@ -11,6 +11,7 @@ from contact_core.atomic_file import read_bounded, write_atomic
 from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import MAX_BYTES, dump_document, parse_document, parse_edited, same_documents
+from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
 from contact_core.edit.history import History
 from contact_core.edit.journal import Journal, JournalContents, read_journal, replay
 from contact_core.errors import EditedFile, FileRefused
@@ -75,28 +76,29 @@ def digest_of(path: Path) -> str | None:
     return file_digest(read_bounded(path, MAX_BYTES)) if path.exists() else None
 
 
-def open_file(path: Path) -> OpenedFile:
+def open_file(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> OpenedFile:
     """Open a document for writing, or read-only where someone else has it. A path without a file is a new document.
 
-    Raises FileRefused for a file that is no document or of a newer schema; such a file is left untouched.
+    commands: the kinds that its journal may hold. Raises FileRefused for a file that is no document or of a newer
+    schema; such a file is left untouched.
     """
     lock = DocumentLock.take(path)
     if isinstance(lock, str):
         reason = f"{lock}; it is opened read-only here."
-        return OpenedFile(path, History(read_only_document(path)), None, None, (reason,), reason)
+        return OpenedFile(path, History(read_only_document(path, commands)), None, None, (reason,), reason)
     try:
-        return _open_locked(path, lock)
+        return _open_locked(path, lock, commands)
     except BaseException:
         lock.release()
         raise
 
 
-def read_only_document(path: Path) -> ContactDocument:
+def read_only_document(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> ContactDocument:
     """The document at a path as last saved, nothing locked and nothing written; before its first save, as the
     journal beside it has it. Raises FileRefused."""
     beside = journal_path(path)
     if not path.exists() and beside.exists():
-        return replay(read_journal(beside))[0].document
+        return replay(read_journal(beside), commands)[0].document
     return read_document(path)[0]
 
 
@@ -118,7 +120,7 @@ def set_aside(path: Path) -> str | None:
     return None
 
 
-def _open_locked(path: Path, lock: DocumentLock) -> OpenedFile:
+def _open_locked(path: Path, lock: DocumentLock, commands: CommandTable) -> OpenedFile:
     beside = journal_path(path)
     old, notes = _read_old_journal(beside)
     document, digest = ContactDocument(), None
@@ -129,9 +131,9 @@ def _open_locked(path: Path, lock: DocumentLock) -> OpenedFile:
         if old is None or isinstance(error, EditedFile) or "newer contact-core" in str(error):
             raise  # what can be read is somebody's edit, perhaps
         notes.append(f"{error} It is kept as {_keep(path, 'damaged').name}; the journal holds the document.")
-        return _resume(path, lock, old, None, None, notes)
-    if old is not None and not old.closed and _belongs(old, document, digest):
-        return _resume(path, lock, old, document, digest, notes)
+        return _resume(path, lock, old, None, None, notes, commands)
+    if old is not None and not old.closed and _belongs(old, document, digest, commands):
+        return _resume(path, lock, old, document, digest, notes, commands)
     kept = set_aside(path) if old is not None else None
     if kept is not None:
         notes.append(
@@ -142,10 +144,10 @@ def _open_locked(path: Path, lock: DocumentLock) -> OpenedFile:
     return OpenedFile(path, history, Journal.start(beside, history, digest), lock, tuple(notes), digest=digest)
 
 
-def _belongs(old: JournalContents, document: ContactDocument, digest: str | None) -> bool:
+def _belongs(old: JournalContents, document: ContactDocument, digest: str | None, commands: CommandTable) -> bool:
     """Whether a journal speaks of this document file: it names it, or leads to what it holds (the session ended
     between writing the file and saying so)."""
-    return _names(old, digest) or same_documents(replay(old)[0].document, document)
+    return _names(old, digest) or same_documents(replay(old, commands)[0].document, document)
 
 
 def _names(old: JournalContents, digest: str | None) -> bool:
@@ -170,10 +172,11 @@ def _resume(
     document: ContactDocument | None,
     digest: str | None,
     notes: list[str],
+    commands: CommandTable,
 ) -> OpenedFile:
     """Go on with the journal of a session that was interrupted. document, digest: of the file, None without one."""
     beside = journal_path(path)
-    history, trouble = replay(old)
+    history, trouble = replay(old, commands)
     history.mark_saved(_saved_revision(old, history, document, digest))
     if old.damage or trouble:
         kept = _keep(beside, "damaged", copy=True)

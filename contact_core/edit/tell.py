@@ -14,20 +14,21 @@ from contact_core.contact.placement import Link, Placement
 from contact_core.document.codec import to_json
 from contact_core.document.document import ContactDocument, Patch
 from contact_core.document.schema import dump_document
+from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
 from contact_core.edit.history import History
 from contact_core.edit.journal import read_journal, replay
 from contact_core.edit.recovery import journal_path, read_document, write_document
 from contact_core.errors import FileRefused
 
 
-def history_lines(path: Path) -> list[str]:
+def history_lines(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> list[str]:
     """The steps that the journal of a document (or a journal itself) records, oldest first.
 
     A mark shows where the history stands (>) and what is undone (-). Raises FileRefused when there is no journal.
     """
     journal = _journal_of(path)
     contents = read_journal(journal)
-    history, trouble = replay(contents)
+    history, trouble = replay(contents, commands)
     lines = [f"{journal.name}: {_count(len(history.steps), 'step')} from revision {history.base_revision}"]
     done = len(history.done)
     for number, step in enumerate(history.steps, start=1):
@@ -39,10 +40,10 @@ def history_lines(path: Path) -> list[str]:
     return lines
 
 
-def replay_lines(path: Path, output: Path | None = None) -> list[str]:
+def replay_lines(path: Path, output: Path | None = None, commands: CommandTable = BUILT_IN_COMMANDS) -> list[str]:
     """Replay a journal (or that of a document) and say what came of it; write the document to `output` if given."""
     contents = read_journal(_journal_of(path))
-    history, trouble = replay(contents)
+    history, trouble = replay(contents, commands)
     lines = [f"replayed {_count(contents.edits, 'event')} to revision {history.revision}: {_summary(history)}"]
     lines += [f"! {sentence}" for sentence in (contents.damage, trouble) if sentence]
     if output is not None:

@@ -192,8 +192,8 @@ class PluginManager:
 
     def _fill(self, slot: Slot[Any]) -> dict[str, Any]:
         """Objects by name over all plugins, lowest precedence first, duplicates refused unless they replace."""
-        filled: dict[str, Any] = {}
-        owner: dict[str, PluginRecord] = {}
+        filled: dict[str, Any] = dict(resolve(slot.core)) if slot.core else {}
+        owner = dict.fromkeys(filled, "contact-core itself")
         for record in tuple(self._records.values()):
             if slot.hook not in record.collected:
                 record.collected[slot.hook] = self._collect(record, slot)
@@ -202,15 +202,14 @@ class PluginManager:
                 replaced = {*replaces, *record.replaces} & filled.keys()
                 if name in filled and name not in replaced:
                     record.complain(
-                        f"its {slot.noun} {name!r} is refused: the plugin {owner[name].name!r}"
-                        f" ({owner[name].source}) offers one of that name already;"
+                        f"its {slot.noun} {name!r} is refused: {owner[name]} offers one of that name already;"
                         f' rename it, or set replaces = "{name}" on it.'
                     )
                     continue
                 for nobody in set(replaces) - filled.keys() - {name}:
                     self._miss(record, slot, name, nobody, filled)
                 for key in {name, *replaced}:
-                    filled[key], owner[key] = made, record
+                    filled[key], owner[key] = made, f"the plugin {record.name!r} ({record.source})"
                 record.offers.setdefault(slot.noun, []).append(name)
         return filled
 

@@ -29,6 +29,7 @@ class Slot(Generic[T_co]):
 
     hook: the hook that asks for it.  noun: what people call it.  protocol: "module:Name" of what it must satisfy.
     key: the attribute that names an object.  instances: whether the slot holds instances (else classes).
+    core: "module:Name" of a mapping of what the core itself offers, beneath all plugins.
     """
 
     hook: str
@@ -36,6 +37,7 @@ class Slot(Generic[T_co]):
     protocol: str
     key: str = "name"
     instances: bool = True
+    core: str = ""
 
 
 BRUSHES: Slot[Brush] = Slot("contact_brushes", "brush", "contact_core.contact.brush:Brush")
@@ -55,8 +57,9 @@ FORMATS: Slot[Format] = Slot("contact_formats", "format", "contact_core.plugins.
 RENDERERS: Slot[Renderer] = Slot("contact_renderers", "renderer", "contact_core.plugins.slots:Renderer")
 SAMPLES: Slot[Sample] = Slot("contact_samples", "sample", "contact_core.plugins.slots:Sample")
 COMMANDS: Slot[type[Command]] = Slot(
-    "contact_commands", "command", "contact_core.edit.command:Command", key="json_id", instances=False
-)
+    "contact_commands", "command", "contact_core.edit.command:Command", key="json_id", instances=False,
+    core="contact_core.edit.command_table:BUILT_IN_COMMANDS",
+)  # fmt: skip
 CLI: Slot[CliCommand] = Slot("contact_cli", "sub-command", "contact_core.plugins.slots:CliCommand")
 
 SLOTS: tuple[Slot[Any], ...] = (
@@ -98,10 +101,18 @@ def shortcomings(candidate: object, slot: Slot[Any]) -> list[str]:
             result += _call_shortcomings(name, member, getattr(candidate, name), bound=slot.instances)
     if not slot.instances and not isinstance(candidate, type):
         result.append("is an object where a class is wanted")
+    if slot is COMMANDS and not is_frozen_dataclass(candidate):
+        result.append("is no frozen dataclass, whose fields a journal could hold")
     key = getattr(candidate, slot.key, None)
     if not (isinstance(key, str) and key and key.isprintable() and key == key.strip()):
         result.append(f"needs a {slot.key}, a non-empty string of printable letters, but has {key!a}")
     return result
+
+
+def is_frozen_dataclass(candidate: object) -> bool:
+    """Whether this is a class of values that do not change."""
+    parameters = getattr(candidate, "__dataclass_params__", None)
+    return isinstance(candidate, type) and parameters is not None and parameters.frozen
 
 
 def _members(protocol: type) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The verbs that ask plugins: for axes, for brushes, for the commands that a journal may hold."""
+"""The verbs that ask plugins: for axes, for brushes, for engines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from contact_core.edit.announcer import DocumentChanged
-from contact_core.edit.command import register_command
 from contact_core.edit.verbs import SurfaceVerbs, Verbs
 from contact_core.geometry.surface_point import SurfacePoints
 
@@ -14,14 +13,6 @@ if TYPE_CHECKING:
     from contact_core.contact.brush import Brush
     from contact_core.geometry.engine import GeodesicEngine
     from contact_core.plugins.manager import PluginManager
-
-
-def know_commands(plugins: PluginManager) -> None:
-    """Make the commands of plugins known, so that journals which hold them replay. InvalidInput on a clash."""
-    from contact_core.plugins.registry import COMMANDS
-
-    for command in plugins.offers(COMMANDS).values():
-        register_command(command)
 
 
 class PluginVerbs(Verbs, SurfaceVerbs):
@@ -41,10 +32,6 @@ class PluginVerbs(Verbs, SurfaceVerbs):
             given, discover = self._plugin_arguments
             self._plugins = PluginManager(given, discover=discover)
         return self._plugins
-
-    def register_commands(self) -> None:
-        """Make the commands of plugins known, so that journals which hold them replay."""
-        know_commands(self.plugins)
 
     def default_axis(self, surface: str, patch: str, points: SurfacePoints, generator: str | None) -> SurfacePoints:
         """Axis points from an axis generator: the one named, or the one that the plugins choose."""

@@ -110,13 +110,6 @@ def contact_samples() -> list[object]:
 
 
 @hookimpl
-def contact_commands() -> list[object]:
-    from contact_core.edit import commands  # values and numpy only, and all of them load together
-
-    return [getattr(commands, name) for name in commands.__all__]
-
-
-@hookimpl
 def contact_cli() -> list[object]:
     return [
         "contact_builtins.cli.inspect:Inspect",

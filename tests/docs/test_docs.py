@@ -17,7 +17,6 @@ from typing import Any
 
 import pytest
 
-from contact_core.edit.command import registered_commands, unregister_command
 from contact_core.plugins import hookspecs
 from contact_core.plugins.registry import AXIS_GENERATORS, SLOTS, Slot
 from contact_core.testing import SUITES
@@ -53,11 +52,8 @@ def test_the_code_of_every_page_runs(page: Path, tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     module = ModuleType("page")
     monkeypatch.setitem(sys.modules, "page", module)
-    known = set(registered_commands())
     for number, code in enumerate(blocks(page, "python"), start=1):
         exec(compile(code, f"{page.name}, block {number}", "exec"), module.__dict__)
-    for added in set(registered_commands()) - known:  # the laws of commands are tested over all that are known
-        unregister_command(added)
 
 
 def test_every_hook_is_documented_with_its_signature() -> None:

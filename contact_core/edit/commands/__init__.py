@@ -1,4 +1,4 @@
-"""Every built-in command. Importing this package registers them all."""
+"""Every built-in command; `edit.command_table` makes the default table of what is named here."""
 
 from contact_core.edit.command import Macro
 from contact_core.edit.commands.organising import (

@@ -10,12 +10,11 @@ from contact_core.contact.shape import PatchShape
 from contact_core.document.codec import freeze_json
 from contact_core.document.document import Color, ContactDocument, ContactPair, Patch, check_name, named
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.edit.command import BaseCommand, Command, register_command
+from contact_core.edit.command import BaseCommand, Command
 from contact_core.edit.commands.checks import add_patches, check_free
 from contact_core.errors import CommandRejected
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Pair(BaseCommand):
     """Two patches that are to touch; a pair of the same name is replaced (a new weight, other ends)."""
@@ -35,7 +34,6 @@ class Pair(BaseCommand):
         return later if isinstance(later, Pair) and later.pair.name == self.pair.name else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Unpair(BaseCommand):
     """A pair dissolved."""
@@ -51,7 +49,6 @@ class Unpair(BaseCommand):
         return replace(document, pairs=document.pairs.without(self.pair))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Group(BaseCommand):
     """Patches kept as one, on whatever surfaces they lie; a group of the same name is replaced."""
@@ -72,7 +69,6 @@ class Group(BaseCommand):
         return replace(document, groups=document.groups.with_item(self.name, self.patches))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Ungroup(BaseCommand):
     """A group dissolved; its patches stay."""
@@ -88,7 +84,6 @@ class Ungroup(BaseCommand):
         return replace(document, groups=document.groups.without(self.name))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Rename(BaseCommand):
     """A new name for a patch, everywhere it is named."""
@@ -123,7 +118,6 @@ class Rename(BaseCommand):
         )  # fmt: skip
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Recolor(BaseCommand):
     """A colour (RGB 0..1) for patches."""
@@ -142,7 +136,6 @@ class Recolor(BaseCommand):
         return later if isinstance(later, Recolor) and later.patches == self.patches else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Import(BaseCommand):
     """Patches from a contact set or another document, parents before children, with their shapes and pairs."""
@@ -174,7 +167,6 @@ class Import(BaseCommand):
         return document
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class SetExtra(BaseCommand):
     """JSON data of a host or a plugin under its namespace; None removes it."""

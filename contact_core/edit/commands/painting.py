@@ -11,7 +11,7 @@ from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.contact.placement import Link
 from contact_core.contact.shape import PatchCoordinates, PatchShape
 from contact_core.document.document import ContactDocument, Patch
-from contact_core.edit.command import BaseCommand, register_command
+from contact_core.edit.command import BaseCommand
 from contact_core.edit.commands.checks import (
     NamedPlacements,
     add_patches,
@@ -23,7 +23,6 @@ from contact_core.edit.commands.checks import (
 from contact_core.errors import CommandRejected
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Paint(BaseCommand):
     """A new patch with a shape of its own."""
@@ -40,7 +39,6 @@ class Paint(BaseCommand):
         return add_patches(document.with_shape(self.patch.shape, self.shape), [self.patch])
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Extend(BaseCommand):
     """More points on a patch and all that share its shape. weights: (n,) of the new points."""
@@ -62,7 +60,6 @@ class Extend(BaseCommand):
         return document.with_shape(document.patch(self.patch).shape, shape)
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Erase(BaseCommand):
     """Points taken from a patch and all that share its shape. points: (k,) rising indices of those to go."""
@@ -90,7 +87,6 @@ class Erase(BaseCommand):
         return document.with_shape(document.patch(self.patch).shape, shape.select(keep))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Reshape(BaseCommand):
     """A new shape for a patch and all that share it: another axis, other bindings.
@@ -120,7 +116,6 @@ class Reshape(BaseCommand):
         return document
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Weigh(BaseCommand):
     """New point weights (n,) for a patch and all that share its shape."""
@@ -140,7 +135,6 @@ class Weigh(BaseCommand):
         return document.with_shape(document.patch(self.patch).shape, shape)
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Detach(BaseCommand):
     """A patch gets its shape, deviation included, under a key of its own, and follows its partners no more."""
@@ -162,7 +156,6 @@ class Detach(BaseCommand):
         return without_unused_shapes(_with_originals(document))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Remove(BaseCommand):
     """Patches removed, with their pairs and their places in groups. placements: where their children go."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 from contact_core.contact.placement import Link, Placement, Root
 from contact_core.document.document import ContactDocument, Patch
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.edit.command import BaseCommand, Command, register_command
+from contact_core.edit.command import BaseCommand, Command
 from contact_core.edit.commands.checks import NamedPlacements, add_patches, check_placement
 from contact_core.edit.commands.surfaces import SetPose
 from contact_core.errors import CommandRejected
@@ -38,7 +38,6 @@ class _Place(BaseCommand):
         return later if same else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Translate(_Place):
     """A patch moved along the surface."""
@@ -49,7 +48,6 @@ class Translate(_Place):
         return f"Translate {self.patch}"
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Rotate(_Place):
     """A patch turned about a point of its axis."""
@@ -60,7 +58,6 @@ class Rotate(_Place):
         return f"Rotate {self.patch}"
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Bend(BaseCommand):
     """The turning angle (radians) at an interior axis point, as drawn before mirroring.
@@ -94,7 +91,6 @@ class Bend(BaseCommand):
         return later if same else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Scale(BaseCommand):
     """The factors along and across the axis that a patch ends up with; whose they are goes as for Bend."""
@@ -124,7 +120,6 @@ class Scale(BaseCommand):
         return later if isinstance(later, Scale) and later.patch == self.patch else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Mirror(BaseCommand):
     """A patch as the mirror image of its shape, or not, about its axis' first direction."""
@@ -143,7 +138,6 @@ class Mirror(BaseCommand):
         return later if isinstance(later, Mirror) and later.patch == self.patch else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Transfer(BaseCommand):
     """New patches that share the shapes of patches that exist: one patch, a whole tree, a symmetric copy."""
@@ -161,7 +155,6 @@ class Transfer(BaseCommand):
         return add_patches(document, self.patches)
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Settle(BaseCommand):
     """Contacts moved and rigs posed together: what a proposal becomes when it is accepted.
@@ -185,7 +178,6 @@ class Settle(BaseCommand):
         return document
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class LinkPatch(BaseCommand):
     """A patch hung on a parent."""
@@ -203,7 +195,6 @@ class LinkPatch(BaseCommand):
         return document.with_patches(replace(patch, placement=self.link))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class Unlink(BaseCommand):
     """A patch taken off its parent, to a root of its own."""

@@ -11,13 +11,12 @@ from contact_core.arrays import FloatArray, frozen
 from contact_core.contact.shape import PatchShape
 from contact_core.document.document import ContactDocument, Surface, named
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.edit.command import BaseCommand, Command, register_command
+from contact_core.edit.command import BaseCommand, Command
 from contact_core.edit.commands.checks import NamedPlacements, check_free, check_links, place_all
 from contact_core.errors import CommandRejected
 from contact_core.rig.rig import Pose
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class AddSurface(BaseCommand):
     """A surface that contact may lie on."""
@@ -33,7 +32,6 @@ class AddSurface(BaseCommand):
         return replace(document, surfaces=document.surfaces.with_item(self.surface.name, self.surface))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class RemoveSurface(BaseCommand):
     """A surface forgotten, with its pose. Refused while patches lie on it."""
@@ -56,7 +54,6 @@ class RemoveSurface(BaseCommand):
         )
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class RenameSurface(BaseCommand):
     """A new name for a surface, everywhere it is named."""
@@ -81,7 +78,6 @@ class RenameSurface(BaseCommand):
         return document.with_patches(*(replace(patch, surface=self.name) for patch in moved))
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class PlaceSurface(BaseCommand):
     """Where a surface stands in the scene: world_from_surface (4, 4), rigid."""
@@ -105,7 +101,6 @@ class PlaceSurface(BaseCommand):
         return later if isinstance(later, PlaceSurface) and later.surface == self.surface else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class RebindSurface(BaseCommand):
     """A surface becomes another mesh; shapes and placements hold what was projected onto it.
@@ -139,7 +134,6 @@ class RebindSurface(BaseCommand):
         return document
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class SetPose(BaseCommand):
     """The pose that the rig of a surface is in: the result of a solve, or the animator's own."""
@@ -163,7 +157,6 @@ class SetPose(BaseCommand):
         return later if isinstance(later, SetPose) and later.surface == self.surface else None
 
 
-@register_command
 @dataclass(frozen=True, eq=False)
 class ClearPose(BaseCommand):
     """Back to the rest pose."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from collections.abc import Sequence
 from functools import cache
 
@@ -13,17 +15,15 @@ from hypothesis import strategies as st
 from contact_core.contact.placement import Link, Root
 from contact_core.document.document import ContactDocument, Patch, Surface
 from contact_core.document.schema import dump_document, parse_document
-from contact_core.edit.command import (
-    Command,
-    command_from_json,
-    command_to_json,
-    register_command,
-    registered_commands,
-    unregister_command,
-)
+from contact_core.edit import commands
+from contact_core.edit.command import BaseCommand, Command, command_to_json
+from contact_core.edit.command_table import BUILT_IN_COMMANDS, command_from_json
 from contact_core.edit.commands import AddSurface, Bend, LinkPatch, Paint, Recolor, SetExtra
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected, FileRefused, InvalidInput
+from contact_core.plugins import hookimpl
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import COMMANDS
 from contact_core.testing.command_contract import CommandCase, CommandContract
 from contact_core.testing.random_commands import MAKERS, random_command, random_history, try_to_do
 from contact_core.testing.random_values import random_shape
@@ -53,7 +53,7 @@ def follower(command: Command, document: ContactDocument, rng: np.random.Generat
     return None
 
 
-@pytest.mark.parametrize("json_id", sorted(registered_commands()))
+@pytest.mark.parametrize("json_id", sorted(BUILT_IN_COMMANDS))
 class TestEveryRegisteredCommand(CommandContract):
     @pytest.fixture
     def cases(self, json_id: str) -> Sequence[CommandCase]:
@@ -61,7 +61,11 @@ class TestEveryRegisteredCommand(CommandContract):
 
 
 def test_no_command_escapes_the_laws() -> None:
-    assert set(registered_commands()) == set(MAKERS)
+    for found in pkgutil.iter_modules(commands.__path__):
+        for kind in vars(importlib.import_module(f"{commands.__name__}.{found.name}")).values():
+            if isinstance(kind, type) and issubclass(kind, BaseCommand) and hasattr(kind, "json_id"):
+                assert BUILT_IN_COMMANDS[kind.json_id] is kind
+    assert set(BUILT_IN_COMMANDS) == set(MAKERS) and len(BUILT_IN_COMMANDS) == len(commands.__all__)
 
 
 def test_drags_merge() -> None:
@@ -184,10 +188,15 @@ def test_two_commands_of_one_name_are_refused() -> None:
     class Other(Bend):
         pass
 
-    with pytest.raises(InvalidInput, match=r"two commands call themselves 'contact\.bend'"):
-        register_command(Other)
-    assert registered_commands()["contact.bend"] is Bend
-    unregister_command("contact.nothing")
+    class Offering:
+        @hookimpl
+        def contact_commands(self) -> list[type[Command]]:
+            return [Other]
+
+    manager = PluginManager(discover=False)
+    with pytest.raises(InvalidInput, match=r"'contact\.bend' is refused: contact-core itself offers one"):
+        manager.register(Offering)
+    assert manager.offers(COMMANDS)["contact.bend"] is Bend
 
 
 def test_cycles_are_refused() -> None:

@@ -12,7 +12,7 @@ from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Link, Root
 from contact_core.document.codec import MAX_DEPTH
 from contact_core.document.schema import dump_document, inconsistencies, parse_document
-from contact_core.edit.command import command_from_json
+from contact_core.edit.command_table import command_from_json
 from contact_core.edit.commands import Transfer
 from contact_core.errors import FileRefused
 from contact_core.geometry.surface_point import SurfacePoints
