@@ -72,7 +72,7 @@ def _race(descents: list[Descent], budget: int) -> SolveStatus:
 
 @dataclass
 class Descent:
-    """One descent that can be advanced in portions."""
+    """One descent that can be advanced in portions. limits: lower and upper (d,), by default the problem's."""
 
     run: Run
     theta: FloatArray
@@ -80,9 +80,10 @@ class Descent:
     damping: float = FIRST_DAMPING
     growth: float = 2.0
     settled: bool = False
+    limits: tuple[FloatArray, FloatArray] | None = None
 
     def __post_init__(self) -> None:
-        self.lower, self.upper = self.run.problem.limits_of_theta
+        self.lower, self.upper = self.limits or self.run.problem.limits_of_theta
         self.state, self.value = self.run.evaluate(np.clip(self.theta, self.lower, self.upper))
         self._model: tuple[PoseState, FloatArray, FloatArray] | None = None
 
