@@ -129,13 +129,17 @@ def test_split_vertices_weld_and_loose_ones_go(tmp_path: Path) -> None:
 PLY_POINT = b"ply\nformat %s 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
 
 REFUSED = {
-    "missing corner": ("m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "vertex 8"),
-    "zero index": ("m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "counts from 1"),
+    "missing corner": ("m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "line 4 names vertex 9, but there are 3"),
+    "zero index": (
+        "m.obj",
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
+        "names vertex 0, but there are 3, counted from 1",
+    ),
     "not a number": ("m.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
     "infinite": ("m.obj", b"v 0 0 0\nv inf 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
-    "words": ("m.obj", b"v zero 0 0\n", "damaged"),
+    "words": ("m.obj", b"v zero 0 0\n", "line 1: 'zero' is not a number"),
     "no faces": ("m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
-    "empty": ("m.obj", b"", "no faces"),
+    "empty": ("m.obj", b"", "it is empty"),
     "huge off": ("m.off", b"OFF\n99999999999 1 0\n", "99999999999 vertices"),
     "short off": ("m.off", b"OFF\n3 1 0\n0 0 0\n", "ends after"),
     "huge ply": (

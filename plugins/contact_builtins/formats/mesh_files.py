@@ -10,7 +10,7 @@ from contact_builtins.formats.polygon_parsers import parse_obj, parse_off, parse
 from contact_builtins.formats.polygons import Polygons, surface_of
 from contact_builtins.formats.refusal import file_bytes, refusing
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.rig.rig import Pose
 
@@ -39,14 +39,17 @@ class MeshFiles:
         if suffix not in PARSERS:
             raise FileRefused(f"{path} ends in {suffix!r}; mesh files end in {', '.join(PARSERS)}.")
         with refusing(path, f"a mesh in {suffix[1:].upper()} form"):
-            polygons = PARSERS[suffix](file_bytes(path))
+            data = file_bytes(path)
+            if not data.strip():
+                raise InvalidInput("it is empty")
+            polygons = PARSERS[suffix](data)
             surface = surface_of(polygons)
         return Asset(
             name=path.stem,
             mesh=TriangleMesh(surface.points, surface.faces),
             source_vertices=surface.source_vertices,
             source_faces=surface.source_faces,
-            notes=surface.notes,
+            notes=(*polygons.notes, *surface.notes),
             details={"format": suffix[1:], "polygons": len(polygons.sizes)},
         )
 

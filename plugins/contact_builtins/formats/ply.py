@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +11,8 @@ import numpy.typing as npt
 
 from contact_builtins.formats.polygons import Polygons
 from contact_builtins.formats.refusal import bounded
+from contact_builtins.formats.words import as_whole, numbers, plain, whole
+from contact_core.arrays import IntArray
 from contact_core.errors import InvalidInput
 
 TYPES = {
@@ -50,9 +53,10 @@ class Element:
 
 def parse_ply(data: bytes) -> Polygons:
     """The polygons of a PLY file's bytes. Raises InvalidInput, ValueError or LookupError on damage."""
-    encoding, elements, body = _header(data)
-    if encoding == "ascii":  # the same rows, every number a double
-        body, order = np.array(body.split(), np.float64).tobytes(), "="
+    encoding, elements, body = _header(plain(data))
+    text = encoding == "ascii"
+    if text:  # the same rows, every number a double
+        body, order = numbers(body.split(), lambda k: f"number {k + 1} after the header").tobytes(), "="
         elements = [element.of_doubles() for element in elements]
     elif encoding in BYTE_ORDERS:
         order = BYTE_ORDERS[encoding]
@@ -61,30 +65,69 @@ def parse_ply(data: bytes) -> Polygons:
     tables, at = dict[str, Table](), 0
     for element in elements:
         tables[element.name], at = _table(body, element, at, order)
-    vertex, face = tables.get("vertex", {}), tables.get("face", {})
+    if text and at < len(body):
+        raise InvalidInput(f"{(len(body) - at) // 8} numbers are left over; its header states fewer")
+    vertex = tables.get("vertex", {})
+    missing = [axis for axis in "xyz" if axis not in vertex]
+    if missing:
+        raise InvalidInput(f"its vertices have no {missing[0]}")
     points = np.stack([vertex[axis][1].astype(np.float64) for axis in "xyz"], axis=1)  # (n, 3)
-    polygons = face.get("vertex_indices", face.get("vertex_index"))
-    if polygons is None:
-        raise InvalidInput("it has no faces, only points")
-    return Polygons(points, polygons[0].astype(np.int64), polygons[1].astype(np.int64))
+    sizes, indices = _faces(tables)
+    return Polygons(points, sizes, indices)
+
+
+def _faces(tables: dict[str, Table]) -> tuple[IntArray, IntArray]:
+    """Sizes and corners of the faces, or of the triangle strips (each ended by -1) that stand for them."""
+    face, strips = tables.get("face", {}), tables.get("tristrips", {})
+    for name in ("vertex_indices", "vertex_index"):
+        if name in face:
+            return as_whole(face[name][0], "the sizes of faces"), as_whole(face[name][1], "corners of faces")
+        if name in strips:
+            return _of_strips(as_whole(strips[name][1], "corners of strips"))
+    raise InvalidInput("it has no faces, only points")
+
+
+def _of_strips(corners: IntArray) -> tuple[IntArray, IntArray]:
+    windows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1) if len(corners) > 2 else corners[:0]
+    triangles = windows.reshape(-1, 3)
+    place = np.arange(len(corners))
+    starts = np.maximum.accumulate(np.where(corners < 0, place + 1, 0))[: len(triangles)]  # where its strip began
+    odd = (place[: len(triangles)] - starts) % 2 == 1
+    triangles[odd] = triangles[odd][:, [1, 0, 2]]
+    triangles = triangles[(triangles >= 0).all(axis=1)]
+    return np.full(len(triangles), 3), triangles.ravel()
 
 
 def _header(data: bytes) -> tuple[str, list[Element], bytes]:
-    head, mark, rest = data.partition(b"end_header")
-    if not data.startswith(b"ply") or not mark or b"\n" not in rest:
-        raise InvalidInput('it does not start with "ply" and a header')
-    encoding, elements = "", list[Element]()
-    for line in head.decode("ascii", "replace").splitlines():
-        words = line.split()
-        if words[:1] == ["format"]:
-            encoding = words[1]
-        elif words[:1] == ["element"]:
-            elements.append(Element(words[1], bounded(int(words[2]), f"rows of {words[1]}")))
-        elif words[:2] == ["property", "list"]:
-            elements[-1].properties.append(Property(words[4], TYPES[words[3]], TYPES[words[2]]))
-        elif words[:1] == ["property"]:
-            elements[-1].properties.append(Property(words[2], TYPES[words[1]]))
-    return encoding, elements, rest[rest.index(b"\n") + 1 :]
+    """Format, elements and body. Lines end as the first one does: LF, CR LF, or CR alone."""
+    if data[:3].lower() != b"ply":
+        raise InvalidInput('it does not start with "ply"')
+    first = re.search(rb"\r\n?|\n", data)
+    newline = b"\r" if first is not None and first[0] == b"\r" else b"\n"
+    encoding, elements, at, number = "", list[Element](), 0, 0
+    while True:
+        end = data.find(newline, at)
+        if end < 0:
+            raise InvalidInput("its header has no end_header line")
+        words, at, number = data[at:end].decode("ascii", "replace").split(), end + 1, number + 1
+        if words == ["end_header"]:
+            return encoding, elements, data[at:]
+        try:
+            encoding = words[1] if words[:1] == ["format"] else encoding
+            _declare(words, elements)
+        except LookupError:
+            raise InvalidInput(f"line {number} of its header is no declaration of PLY") from None
+
+
+def _declare(words: list[str], elements: list[Element]) -> None:
+    """Take a line of the header in. Raises InvalidInput; LookupError where words are missing or unknown."""
+    if words[:1] == ["element"]:
+        count = whole(words[2].encode(), f"the count of {words[1]}")
+        elements.append(Element(words[1], bounded(count, f"rows of {words[1]}")))
+    elif words[:2] == ["property", "list"]:
+        elements[-1].properties.append(Property(words[4], TYPES[words[3]], TYPES[words[2]]))
+    elif words[:1] == ["property"]:
+        elements[-1].properties.append(Property(words[2], TYPES[words[1]]))
 
 
 def _table(body: bytes, element: Element, at: int, order: str) -> tuple[Table, int]:
@@ -126,15 +169,20 @@ def _table_row_by_row(body: bytes, element: Element, at: int, order: str) -> tup
 
 
 def _row(body: bytes, element: Element, at: int, order: str) -> tuple[list[Column], int]:
-    """The values of each property of the row at byte `at`, and where the next row starts."""
+    """The values of each property of the row at byte `at`, and where the next row starts. Raises InvalidInput."""
     values = []
     for p in element.properties:
         size = 1
         if p.size_type:
-            kind = np.dtype(order + p.size_type)
-            size = bounded(int(np.frombuffer(body, kind, 1, at)[0]), "corners of one face")
-            at += kind.itemsize
-        kind = np.dtype(order + p.value_type)
-        values.append(np.frombuffer(body, kind, size, at) if size else np.zeros(0, kind))
-        at += kind.itemsize * size
+            stated, at = _values(body, order + p.size_type, 1, at, element)
+            size = bounded(int(as_whole(stated.astype(np.float64), "the sizes of lists")[0]), "corners of one face")
+        found, at = _values(body, order + p.value_type, size, at, element)
+        values.append(found)
     return values, at
+
+
+def _values(body: bytes, kind: str, count: int, at: int, element: Element) -> tuple[Column, int]:
+    end = at + np.dtype(kind).itemsize * count
+    if end > len(body):
+        raise InvalidInput(f"it ends within its {element.count} rows of {element.name}")
+    return np.frombuffer(body, kind, count, at) if count else np.zeros(0, kind), end

@@ -14,11 +14,13 @@ from contact_core.geometry.weld import weld
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """What a file says. points: (n, 3). sizes: (f,) corners per polygon. indices: (sum of sizes,)."""
+    """What a file says. points: (n, 3). sizes: (f,) corners per polygon. indices: (sum of sizes,). notes: sentences
+    on what the file holds besides."""
 
     points: FloatArray
     sizes: IntArray
     indices: IntArray
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of_triangles(cls, points: FloatArray, faces: IntArray) -> Polygons:
@@ -44,12 +46,13 @@ def surface_of(polygons: Polygons, weld_groups: IntArray | None = None) -> Surfa
     weld_groups: (n,) labels; points of different labels never merge (skins whose weights differ at a seam).
     """
     points, indices = polygons.points, polygons.indices
-    if len(points) and not np.isfinite(points).all():
-        bad = int(np.argmax(~np.isfinite(points).all(axis=1)))
-        raise InvalidInput(f"vertex {bad} is at {points[bad].tolist()}, which is not finite")
     if len(indices) and not (indices.min() >= 0 and indices.max() < len(points)):
         raise InvalidInput(f"faces name vertex {int(indices.max())} or {int(indices.min())} of {len(points)}")
     used = np.unique(indices)
+    finite = np.isfinite(points[used]).all(axis=1)
+    if not finite.all():
+        bad = int(used[np.argmin(finite)])
+        raise InvalidInput(f"vertex {bad} is at {points[bad].tolist()}, which is not finite, and a face uses it")
     welded, group = weld(points[used])
     if weld_groups is not None:
         group = np.unique(np.stack([group, weld_groups[used]]), axis=1, return_inverse=True)[1].reshape(-1)

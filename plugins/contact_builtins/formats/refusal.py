@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
+from json import JSONDecodeError
 from pathlib import Path
 
 from contact_core.errors import FileRefused, InvalidInput
@@ -25,6 +26,17 @@ DAMAGE = (
     struct.error,
 )
 
+_WORDS: dict[type[Exception], str] = {
+    RecursionError: "it is nested too deeply",
+    MemoryError: "it asks for more memory than there is",
+    OverflowError: "a number in it is too large",
+    UnicodeError: "its text is not UTF-8",
+    LookupError: "it refers to something that it does not hold",
+    TypeError: "a value in it is of the wrong kind",
+    AttributeError: "a value in it is of the wrong kind",
+    Exception: "a value in it is not what the format allows",
+}
+
 
 @contextmanager
 def refusing(path: Path, what: str) -> Iterator[None]:
@@ -42,12 +54,13 @@ def refusing(path: Path, what: str) -> Iterator[None]:
 
 def _in_words(error: Exception) -> str:
     """What our own checks say is a sentence already; what Python says of a file's wrong values becomes one."""
-    reason = str(error).strip().rstrip(".") or type(error).__name__
+    if isinstance(error, InvalidInput):
+        return str(error).strip().rstrip(".")
+    if isinstance(error, JSONDecodeError):
+        return f"line {error.lineno}, column {error.colno} is not JSON"
     if isinstance(error, KeyError):
-        return f"{reason} is missing, or no word that the format knows"
-    if isinstance(error, TypeError | AttributeError):
-        return f"a value is of the wrong kind ({reason})"
-    return "a number in it is too large" if isinstance(error, OverflowError) else reason
+        return f"{str(error)[:80]} is missing, or no word that the format knows"
+    return next(words for kind, words in _WORDS.items() if isinstance(error, kind))
 
 
 def file_bytes(path: Path) -> bytes:
@@ -61,6 +74,8 @@ def file_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise FileRefused(f"{path} cannot be read: {error.strerror or error}.") from error
+    except ValueError as error:  # a zero byte, or half of a surrogate pair
+        raise FileRefused(f"{str(path)!r} cannot be the name of a file.") from error
 
 
 def bounded(count: int, what: str) -> int:
