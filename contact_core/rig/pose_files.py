@@ -13,7 +13,7 @@ import numpy as np
 
 from contact_core.atomic_file import write_atomic
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.rig.poses import PoseKeys
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose
 
 SCHEMA = 1
@@ -67,6 +67,8 @@ def load_pose(path: Path | str) -> Pose:
 def save_keys(path: Path | str, keys: PoseKeys) -> None:
     """Write keys as JSON, atomically. Raises FileRefused."""
     held = [{"frame": frame, **_plain(pose)} for frame, pose in zip(keys.frames, keys.poses, strict=True)]
+    for key, speeds in zip(held, keys.speeds, strict=keys.is_cubic):
+        key["speeds"] = speeds.ravel().tolist()
     write_atomic(path, json.dumps({"kind": "contact.keys", "schema": SCHEMA, "rig": keys.rig, "keys": held}))
 
 
@@ -75,7 +77,9 @@ def load_keys(path: Path | str) -> PoseKeys:
     data = _read(path, "contact.keys")
     try:
         frames = tuple(float(key["frame"]) for key in data["keys"])
-        return PoseKeys(str(data["rig"]), frames, tuple(_pose(key, Path(path)) for key in data["keys"]))
+        poses = tuple(_pose(key, Path(path)) for key in data["keys"])
+        speeds = tuple(np.array(key["speeds"], float).reshape(-1, 6) for key in data["keys"] if "speeds" in key)
+        return PoseKeys(str(data["rig"]), frames, poses, speeds)
     except (KeyError, TypeError, ValueError) as error:
         raise FileRefused(f"{Path(path).name} holds no keys that can be read: {error}.") from error
 

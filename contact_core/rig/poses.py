@@ -1,12 +1,10 @@
-"""What people do with poses: set angles, blend, mirror, key at frames."""
+"""What people do with poses: set angles, blend, mirror."""
 
 from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -108,47 +106,6 @@ def mirrored_name(name: str) -> str:
             if found != name:
                 return found
     return name
-
-
-@dataclass(frozen=True, eq=False)
-class PoseKeys:
-    """Poses at frames, in order. Immutable: `with_key` answers new keys."""
-
-    rig: str
-    frames: tuple[float, ...] = ()
-    poses: tuple[Pose, ...] = ()
-
-    def __post_init__(self) -> None:
-        if len(self.frames) != len(self.poses) or list(self.frames) != sorted(set(self.frames)):
-            raise InvalidInput(
-                f"keys need one pose per frame and rising frames, but got {len(self.poses)} poses at"
-                f" {list(self.frames)[:6]}."
-            )
-
-    def with_key(self, frame: float, pose: Pose) -> PoseKeys:
-        """These keys with a pose at a frame, replacing the one that is there."""
-        if not math.isfinite(frame):
-            raise InvalidInput(f"a frame is a finite number, but {frame} came.")
-        keys = dict(zip(self.frames, self.poses, strict=True)) | {float(frame): pose}
-        frames = tuple(sorted(keys))
-        return PoseKeys(self.rig, frames, tuple(keys[f] for f in frames))
-
-    def without_key(self, frame: float) -> PoseKeys:
-        """These keys without the one at a frame; raises InvalidInput when there is none."""
-        if frame not in self.frames:
-            raise InvalidInput(f"there is no key at frame {frame:g}; there are {[f'{f:g}' for f in self.frames]}.")
-        keep = [i for i, f in enumerate(self.frames) if f != frame]
-        return PoseKeys(self.rig, tuple(self.frames[i] for i in keep), tuple(self.poses[i] for i in keep))
-
-    def at(self, rig: Rig, frame: float) -> Pose:
-        """The pose at a frame, blended between neighbours and held beyond the ends."""
-        if not self.frames:
-            raise InvalidInput(f"{self.rig} has no keys yet; set one first.")
-        after = bisect_right(self.frames, frame)
-        if after == 0 or after == len(self.frames):
-            return self.poses[min(after, len(self.frames) - 1)]
-        before, then = self.frames[after - 1], self.frames[after]
-        return blend(rig, self.poses[after - 1], self.poses[after], (frame - before) / (then - before))
 
 
 def _turn(transform: FloatArray) -> FloatArray:

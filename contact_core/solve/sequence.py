@@ -9,7 +9,7 @@ from typing import Literal
 
 from contact_core.errors import InvalidInput
 from contact_core.progress import NO_PROGRESS, Progress
-from contact_core.rig.poses import PoseKeys
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus

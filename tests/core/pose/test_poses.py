@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.rig.chart import Chart
 from contact_core.rig.pose_files import PoseLibrary, load_keys, load_pose, save_keys, save_pose
-from contact_core.rig.poses import PoseKeys, blend, mirrored_name, mirrored_pose, set_angles
+from contact_core.rig.pose_keys import PoseKeys
+from contact_core.rig.poses import blend, mirrored_name, mirrored_pose, set_angles
 from contact_core.rig.rig import JointFreedom, Pose, Rig, forward_kinematics, skin
 from contact_core.testing import rigs
 
