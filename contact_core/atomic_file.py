@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
 import stat
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -42,7 +44,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
     """
     path = Path(path)
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.name[:40]}.{secrets.token_hex(6)}{target.suffix}")
+    temporary = target.with_name(f"{_prefix(target)}{secrets.token_hex(6)}{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
@@ -57,6 +59,21 @@ def replacing(path: Path | str) -> Iterator[Path]:
         ) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove the temporary files of writers of `path` that were killed. Only for who has the right to write it:
+    the temporary file of a writer that still runs looks the same."""
+    pattern = re.compile(re.escape(_prefix(path)) + "[0-9a-f]{12}" + re.escape(path.suffix))
+    with contextlib.suppress(OSError):  # litter is no reason not to open a document
+        for entry in os.scandir(path.parent):
+            if pattern.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
+                Path(entry.path).unlink()
+
+
+def _prefix(target: Path) -> str:
+    """How the names of temporary files begin. Long names are cut; the checksum tells them apart."""
+    return f".{target.name[:40]}.{zlib.crc32(os.fsencode(target.name)):08x}"
 
 
 def _commit(temporary: Path, target: Path) -> None:

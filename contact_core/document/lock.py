@@ -13,7 +13,7 @@ from typing import Any
 
 
 class DocumentLock:
-    """The right to write a document and its journal. Answered by `take`; let go of by `release`."""
+    """The right to write a document and its journal. `take` returns one, `release` gives it up."""
 
     def __init__(self, path: Path, file: int) -> None:
         self.path = path
@@ -21,7 +21,7 @@ class DocumentLock:
 
     @classmethod
     def take(cls, document_path: Path) -> DocumentLock | str:
-        """The lock, or why there is none: who holds it, or that the file or its folder cannot be written."""
+        """Returns the lock, or a reason why there is none: who holds it, or what cannot be written."""
         if _is_protected(document_path):
             return f"{document_path.name} is write-protected"
         path = document_path.with_name(document_path.name + ".lock")
@@ -39,7 +39,7 @@ class DocumentLock:
         return cls(path, file)
 
     def release(self) -> None:
-        """Let go; the file stays, empty of a holder."""
+        """Give the lock up; the lock file stays, and names no holder."""
         if self._file >= 0:
             os.ftruncate(self._file, 0)
             os.close(self._file)  # closing releases the lock

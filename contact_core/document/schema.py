@@ -20,6 +20,7 @@ from contact_core.errors import EditedFile, FileRefused
 SCHEMA = "contact-core.document"
 VERSION = 1
 DIGEST = "digest"
+_DIGEST_LINE = b' "digest": '
 MAX_BYTES = 1 << 30
 
 # From each released version to the next: data of version k -> data of version k + 1. Nothing else reads old files.
@@ -45,8 +46,14 @@ def dump_document(document: ContactDocument) -> bytes:
 
     The first line says the digest of all others, so that a damaged file is never read as another document.
     """
+    return dump_with_digest(document)[0]
+
+
+def dump_with_digest(document: ContactDocument) -> tuple[bytes, str]:
+    """What `dump_document` and `document_digest` return, at the cost of one."""
     content = _content(document)
-    return b'{\n "digest": "%b",\n' % _digest(content).encode() + content.removeprefix(b"{\n")
+    digest = _digest(content)
+    return b'{\n%b"%b",\n' % (_DIGEST_LINE, digest.encode()) + content.removeprefix(b"{\n"), digest
 
 
 def document_digest(document: ContactDocument) -> str:
@@ -66,12 +73,24 @@ def parse_document(text: bytes, source: str = "the document") -> ContactDocument
 
     The layout of the text does not matter. A digest of null says that nothing is known: such a file is believed.
     """
+    return parse_with_digest(text, source)[0]
+
+
+def parse_with_digest(text: bytes, source: str = "the document") -> tuple[ContactDocument, str]:
+    """What `parse_document` returns, and its `document_digest`. Raises FileRefused, EditedFile."""
     data = parse_json(text, source)
     stated = data.pop(DIGEST, "") if isinstance(data, dict) else ""
     document = document_from_json(data, source)
-    if stated is not None and stated != _digest(_without_digest(text)) and stated != _digest(_canonical(data)):
+    if stated is not None and stated != written_digest(text) and stated != _digest(_canonical(data)):
         raise EditedFile(_disbelief(source, bool(stated)))
-    return document
+    known = isinstance(stated, str) and data["version"] == VERSION
+    return document, str(stated) if known else document_digest(document)
+
+
+def written_digest(text: bytes) -> str:
+    """The digest of a document file that lies as `dump_document` wrote it; any other file gets another digest."""
+    lines = text.split(b"\n", 2)
+    return _digest(lines[0] + b"\n" + lines[2] if len(lines) == 3 and lines[1].startswith(_DIGEST_LINE) else text)
 
 
 def parse_edited(text: bytes, source: str = "the document") -> ContactDocument:
@@ -228,12 +247,6 @@ def _disbelief(source: str, has_digest: bool) -> str:
         f" was meant, `contact accept FILE` states the digest anew; if not, bring back an older copy of the file,"
         f" or write what its journal holds: `contact replay FILE.journal --out NEW`. The file is left untouched."
     )
-
-
-def _without_digest(text: bytes) -> bytes:
-    """The bytes that the digest was taken over, if the file is as `dump_document` wrote it."""
-    lines = text.split(b"\n", 2)
-    return lines[0] + b"\n" + lines[2] if len(lines) == 3 and lines[1].startswith(b' "digest": ') else text
 
 
 _shape_texts: WeakKeyDictionary[PatchShape, Fragment] = WeakKeyDictionary()

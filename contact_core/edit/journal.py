@@ -1,43 +1,37 @@
 """The journal: an append-only file beside an open document, one line for each committed event.
 
-A line is a CRC-32 in eight hex digits, a blank, compact JSON, a newline. The first line holds the whole document
-that the history started from, so a journal alone replays to everything that was acknowledged. An event is
-acknowledged when the operating system has it (killing the process loses nothing); a thread flushes it to the
-disk within FLUSH_SECONDS, which is the window that a power cut can lose.
+The first line holds the whole document that the history started from, so a journal alone replays to everything that
+was acknowledged. An event is acknowledged when the operating system has it (killing the process loses nothing); a
+thread flushes it to the disk within FLUSH_SECONDS, which is the window that a power cut can lose.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import threading
-import zlib
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from contact_core.atomic_file import read_bounded, write_atomic
-from contact_core.document.document import ContactDocument
-from contact_core.document.schema import document_from_json, document_to_json, open_envelope
+from contact_core.atomic_file import write_atomic
+from contact_core.document.schema import document_digest, document_to_json
 from contact_core.edit.command import command_to_json
-from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable, command_from_json
 from contact_core.edit.history import History, Step
-from contact_core.errors import ContactError, FileRefused
+from contact_core.edit.journal_file import ID_DIGITS, SCHEMA, VERSION, encode_line
+from contact_core.errors import FileRefused
 
-SCHEMA = "contact-core.journal"
-VERSION = 1
 FLUSH_SECONDS = 0.1
-MAX_BYTES = 4 << 30
-
-UPGRADES: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}  # of the first line, by version
 
 
 class Journal:
-    """An open journal, for one writer. Use `start` or `resume`."""
+    """An open journal, for one writer; `start` makes a new one.
 
-    def __init__(self, path: Path) -> None:
+    last_number: of its last line. journal_id: on each of its lines.
+    """
+
+    def __init__(self, path: Path, last_number: int, journal_id: str) -> None:
         self.path = path
+        self._number = last_number
+        self._id = journal_id
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
         except OSError as error:
@@ -51,9 +45,9 @@ class Journal:
 
     @classmethod
     def start(cls, path: Path, history: History, file_digest: str | None) -> Journal:
-        """A new journal of a history, its steps so far included, written whole and flushed. Raises FileRefused.
+        """A new journal of a history, with its steps so far, written atomically and flushed. Raises FileRefused.
 
-        file_digest: of the document file as it lies on the disk, None where there is none yet.
+        file_digest: of the document in the file on the disk, None where there is none yet.
         """
         header = {
             "journal": SCHEMA,
@@ -62,11 +56,13 @@ class Journal:
             "file": file_digest,
             "document": document_to_json(history.base),
         }
-        events = [_event_of(step) for step in history.steps]
+        events = [header, *(_event_of(step) for step in history.steps)]
         if history.can_redo:
             events.append({"goto": history.revision})
-        write_atomic(path, b"".join(map(encode_line, [header, *events])))
-        return cls(path)
+        journal_id = document_digest(history.base)[:ID_DIGITS]
+        lines = (encode_line(event, number, journal_id) for number, event in enumerate(events, start=1))
+        write_atomic(path, b"".join(lines))
+        return cls(path, len(events), journal_id)
 
     def did(self, step: Step) -> None:
         """Record a step about to be committed.
@@ -80,7 +76,7 @@ class Journal:
         self._append({"goto": revision})
 
     def saved(self, revision: int, file_digest: str) -> None:
-        """Record that the document file now holds `revision`. Raises FileRefused."""
+        """Record that the document file now holds the document of `revision`. Raises FileRefused."""
         self._append({"saved": revision, "file": file_digest})
 
     def flush(self) -> None:
@@ -117,8 +113,8 @@ class Journal:
                 self._flusher.join()
 
     def _append(self, event: dict[str, Any]) -> None:
-        line = encode_line(event)
         with self._lock:
+            line = encode_line(event, self._number + 1, self._id)
             if self._file < 0:
                 raise FileRefused(f"the journal {self.path} is closed.")
             if self._broken is not None:
@@ -128,6 +124,7 @@ class Journal:
             except OSError as error:
                 self._take_back(error)
             self._length += len(line)
+            self._number += 1
         self._flush_later()
 
     def _take_back(self, error: OSError) -> None:
@@ -157,118 +154,8 @@ class Journal:
                 self._broken = f"the disk under {self.path} reports {error.strerror or error}; save elsewhere."
 
 
-@dataclass(frozen=True, eq=False)
-class JournalContents:
-    """A journal as read. base: the first document. file_digest: of the document file then, None if none.
-
-    events: the whole events. damage: None, or a sentence on what follows.
-    """
-
-    base: ContactDocument
-    base_revision: int
-    file_digest: str | None
-    events: tuple[dict[str, Any], ...]
-    damage: str | None
-
-    @property
-    def closed(self) -> bool:
-        """Whether the session ended in order."""
-        return bool(self.events) and "closed" in self.events[-1]
-
-    @property
-    def saved_revisions(self) -> dict[str, int]:
-        """Which revision the document file held, by the digest of the file."""
-        saved = [event for event in self.events if "saved" in event]
-        return {event["file"]: event["saved"] for event in saved if isinstance(event.get("file"), str)}
-
-    @property
-    def edits(self) -> int:
-        """How many events changed the document."""
-        return sum("do" in event or "goto" in event for event in self.events)
-
-
-def read_journal(path: Path) -> JournalContents:
-    """The sound part of a journal. Raises FileRefused when not even the first line is."""
-    damage, records = None, []
-    for number, line in enumerate(_lines(read_bounded(path, MAX_BYTES)), start=1):
-        event = decode_line(line)
-        if event is None:
-            damage = f"line {number} of {path.name} is damaged or was cut off; all before it is whole."
-            break
-        records.append(event)
-    if not records:
-        raise FileRefused(f"{path} is damaged from its first line on; nothing can be recovered from it.")
-    header = records[0]
-    body = open_envelope(header, SCHEMA, VERSION, UPGRADES, str(path), schema_key="journal")
-    base = document_from_json(body.get("document"), f"the document in {path.name}")
-    revision, digest = _whole_number(body, "revision"), body.get("file")
-    if not (digest is None or isinstance(digest, str)):
-        raise FileRefused(f"{path} names no document file that could be ({str(digest)[:60]!r}).")
-    return JournalContents(base, revision, digest, tuple(records[1:]), damage)
-
-
-def replay(contents: JournalContents, commands: CommandTable = BUILT_IN_COMMANDS) -> tuple[History, str | None]:
-    """The history that a journal records, and None or a sentence on the event that could not be replayed.
-
-    commands: the kinds that it may hold.
-    """
-    history = History(contents.base, contents.base_revision)
-    for number, event in enumerate(contents.events, start=2):
-        try:
-            _replay_event(history, event, commands)
-        except ContactError as error:
-            return history, f"the event on line {number} cannot be replayed: {error}"
-    return history, None
-
-
-def encode_line(event: dict[str, Any]) -> bytes:
-    """One line of a journal."""
-    body = json.dumps(event, separators=(",", ":"), allow_nan=False).encode()
-    return b"%08x %b\n" % (zlib.crc32(body), body)
-
-
-def decode_line(line: bytes) -> dict[str, Any] | None:
-    """The event of a whole line, or None for a damaged one."""
-    if len(line) < 10 or line[8:9] != b" " or not line.endswith(b"\n"):
-        return None
-    body = line[9:-1]
-    if b"%08x" % zlib.crc32(body) != line[:8]:
-        return None
-    try:
-        event = json.loads(body)
-    except (ValueError, RecursionError):  # whole, but nothing that this journal would write
-        return None
-    return event if isinstance(event, dict) else None
-
-
 def _event_of(step: Step) -> dict[str, Any]:
     return {"at": step.revision, "do": command_to_json(step.command), "origin": step.origin}
-
-
-def _replay_event(history: History, event: dict[str, Any], commands: CommandTable) -> None:
-    if "do" in event:
-        command = command_from_json(event["do"], commands)
-        merged = bool(event.get("merged"))  # then the recorded command is the merged one
-        history.do_as(command, str(event.get("origin")), _whole_number(event, "at"), merged=merged)
-    elif "goto" in event:
-        history.goto(_whole_number(event, "goto"))
-    elif "saved" in event and not (isinstance(event.get("file"), str) and _whole_number(event, "saved") >= 0):
-        raise FileRefused("it names no document file.")
-
-
-def _whole_number(event: Mapping[str, Any], key: str) -> int:
-    number = event.get(key)
-    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 1 << 63:
-        raise FileRefused(f"its {key!r} is a whole number, but {str(number)[:60]} came.")
-    return number
-
-
-def _lines(raw: bytes) -> Iterator[bytes]:
-    start = 0
-    while start < len(raw):
-        end = raw.find(b"\n", start) + 1 or len(raw)
-        yield raw[start:end]
-        start = end
 
 
 def _write_all(file: int, data: bytes) -> None:

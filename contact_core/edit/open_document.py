@@ -33,7 +33,7 @@ class OpenDocument:
         self.path = path
         self.notes = notes
         self.read_only = read_only
-        self._digest = digest  # of the file as this session read or wrote it last
+        self._digest = digest  # of the document in the file as this session read or wrote it last
         self._journal = journal
         self._lock = lock
 

@@ -1,27 +1,36 @@
-"""Opening a document file: take its lock, read it, replay an interrupted journal. Nothing is ever deleted."""
+"""Opening a document file: take its lock, read it, replay an interrupted journal. Nothing unsaved is deleted."""
 
 from __future__ import annotations
 
-import hashlib
-import shutil
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from contact_core.atomic_file import read_bounded, write_atomic
+from contact_core.atomic_file import read_bounded, remove_leftovers, write_atomic
 from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
-from contact_core.document.schema import MAX_BYTES, dump_document, parse_document, parse_edited, same_documents
+from contact_core.document.schema import (
+    MAX_BYTES,
+    document_digest,
+    dump_with_digest,
+    parse_edited,
+    parse_with_digest,
+    same_documents,
+    written_digest,
+)
 from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
 from contact_core.edit.history import History
-from contact_core.edit.journal import Journal, JournalContents, read_journal, replay
+from contact_core.edit.journal import Journal
+from contact_core.edit.journal_file import JournalContents, read_journal
+from contact_core.edit.replay import Replayed, replay
 from contact_core.errors import EditedFile, FileRefused
 
 
 @dataclass(frozen=True, eq=False)
 class OpenedFile:
-    """What opening a path gave. journal and lock are None when read-only. notes: sentences for the artist.
+    """An opened document. journal and lock are None when read-only. notes: sentences for the artist.
 
-    read_only: why nothing can be written, None where it can. digest: of the document file, None without one.
+    read_only: why nothing can be written, None where it can. digest: of the document in the file, None without one.
     """
 
     path: Path
@@ -33,22 +42,41 @@ class OpenedFile:
     digest: str | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What lies on the disk. document, digest: empty and None where there is no file, or a damaged one."""
+
+    path: Path
+    lock: DocumentLock
+    notes: list[str]
+    document: ContactDocument = field(default_factory=ContactDocument)
+    digest: str | None = None
+    damaged: bool = False
+
+    @property
+    def journal(self) -> Path:
+        return journal_path(self.path)
+
+    @property
+    def saved(self) -> ContactDocument | None:
+        return None if self.digest is None else self.document
+
+
 def journal_path(path: Path) -> Path:
     """Where the journal of a document lies."""
     return path.with_name(path.name + ".journal")
 
 
 def read_document(path: Path) -> tuple[ContactDocument, str]:
-    """The document in a file and the digest of the file. Raises FileRefused."""
-    raw = read_bounded(path, MAX_BYTES)
-    return parse_document(raw, str(path)), file_digest(raw)
+    """The document in a file and its digest. Raises FileRefused, EditedFile."""
+    return parse_with_digest(read_bounded(path, MAX_BYTES), str(path))
 
 
 def write_document(path: Path, document: ContactDocument) -> str:
     """Write a document atomically; returns its digest. Raises FileRefused."""
-    raw = dump_document(document)
+    raw, digest = dump_with_digest(document)
     write_atomic(path, raw)
-    return file_digest(raw)
+    return digest
 
 
 def accept_file(path: Path) -> str:
@@ -66,27 +94,36 @@ def accept_file(path: Path) -> str:
             lock.release()
 
 
-def file_digest(raw: bytes) -> str:
-    """Digest of the bytes of a document file."""
-    return hashlib.sha256(raw).hexdigest()
-
-
 def digest_of(path: Path) -> str | None:
-    """Digest of the document file at a path, None without one. Raises FileRefused."""
-    return file_digest(read_bounded(path, MAX_BYTES)) if path.exists() else None
+    """Digest of the document in the file at a path, None without one; of its bytes where it is no document.
+
+    Raises FileRefused where it cannot be read.
+    """
+    if not path.exists():
+        return None
+    raw = read_bounded(path, MAX_BYTES)
+    digest = written_digest(raw)
+    if digest.encode() in raw[:200]:
+        return digest
+    try:
+        return parse_with_digest(raw, str(path))[1]  # somebody changed its layout, perhaps nothing else
+    except FileRefused:
+        return digest
 
 
 def open_file(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> OpenedFile:
     """Open a document for writing, or read-only where someone else has it. A path without a file is a new document.
 
-    commands: the kinds that its journal may hold. Raises FileRefused for a file that is no document or of a newer
-    schema; such a file is left untouched.
+    commands: the kinds that its journal may hold. Raises FileRefused for a file that is no document, of a newer
+    schema, or edited by hand (EditedFile); such a file is left untouched.
     """
     lock = DocumentLock.take(path)
     if isinstance(lock, str):
         reason = f"{lock}; it is opened read-only here."
         return OpenedFile(path, History(read_only_document(path, commands)), None, None, (reason,), reason)
     try:
+        remove_leftovers(path)
+        remove_leftovers(journal_path(path))
         return _open_locked(path, lock, commands)
     except BaseException:
         lock.release()
@@ -98,60 +135,90 @@ def read_only_document(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -
     journal beside it has it. Raises FileRefused."""
     beside = journal_path(path)
     if not path.exists() and beside.exists():
-        return replay(read_journal(beside), commands)[0].document
+        return replay(read_journal(beside), commands).history.document
     return read_document(path)[0]
 
 
 def keep_foreign(path: Path, digest: str | None) -> str | None:
-    """Keep a copy of a document file that has another digest; answers its name, None where it has this one."""
+    """Keep a copy of a document file that holds another document; returns its name, None where it is the same."""
     found = digest_of(path)
     return None if found in (None, digest) else _keep(path, "replaced", copy=True).name
 
 
 def set_aside(path: Path) -> str | None:
-    """Move the journal of a document out of the way of a new one; answers the name that one keeps which was not
-    closed in order."""
+    """Move the journal of a document out of the way of a new one; returns the name under which it is kept, None
+    where nothing that is not saved is in it: then it is PATH.journal.previous until the next."""
     beside = journal_path(path)
-    old, _ = _read_old_journal(beside)
-    if old is not None and not old.closed and old.edits:
-        return _keep(beside, "unused").name
-    if old is not None:
-        beside.replace(beside.with_name(beside.name + ".previous"))
+    try:
+        old = read_journal(beside) if beside.exists() else None
+    except FileRefused:
+        return _keep(beside, "damaged").name
+    if old is None:
+        return None
+    if old.damage or (not old.closed and old.edits):
+        return _keep(beside, "damaged" if old.damage else "unused").name
+    beside.replace(beside.with_name(beside.name + ".previous"))
     return None
 
 
 def _open_locked(path: Path, lock: DocumentLock, commands: CommandTable) -> OpenedFile:
-    beside = journal_path(path)
-    old, notes = _read_old_journal(beside)
-    document, digest = ContactDocument(), None
+    old, notes = _read_old_journal(journal_path(path))
+    found = _Found(path, lock, notes)
     try:
         if path.exists():
-            document, digest = read_document(path)
+            found = _Found(path, lock, notes, *read_document(path))
     except FileRefused as error:
         if old is None or isinstance(error, EditedFile) or "newer contact-core" in str(error):
             raise  # what can be read is somebody's edit, perhaps
+        replayed = _replay(old, commands, None)
+        if replayed is None:
+            raise
         notes.append(f"{error} It is kept as {_keep(path, 'damaged').name}; the journal holds the document.")
-        return _resume(path, lock, old, None, None, notes, commands)
-    if old is not None and not old.closed and _belongs(old, document, digest, commands):
-        return _resume(path, lock, old, document, digest, notes, commands)
-    kept = set_aside(path) if old is not None else None
-    if kept is not None:
-        notes.append(
-            f"{path.name} was changed by something else since its journal was written; the journal is kept as"
-            f" {kept} (contact replay reads it)."
-        )
-    history = History(document)
-    return OpenedFile(path, history, Journal.start(beside, history, digest), lock, tuple(notes), digest=digest)
+        return _resume(_Found(path, lock, notes, damaged=True), old, replayed)
+    if old is not None and not old.closed:
+        replayed = _replay(old, commands, found.saved)
+        if replayed is not None and _belongs(old, replayed, found):
+            return _resume(found, old, replayed)
+    return _begin(found, old)
 
 
-def _belongs(old: JournalContents, document: ContactDocument, digest: str | None, commands: CommandTable) -> bool:
+def _begin(found: _Found, old: JournalContents | None) -> OpenedFile:
+    """Open a document as its file has it, with a new journal; an old one that may hold more is kept."""
+    name = found.path.name
+    kept = set_aside(found.path) if old is not None else None
+    if old is not None and kept is not None:
+        state = f"{name} was changed by something else since its journal was written"
+        if old.damage:
+            ending = "it was closed in order" if old.closed else "what it holds does not lead to the document file"
+            state = f"{old.damage} {name} is opened as it was saved ({ending})"
+        found.notes.append(f"{state}; the journal is kept as {kept} (contact replay reads it).")
+    history = History(found.document)
+    journal = Journal.start(found.journal, history, found.digest)
+    return OpenedFile(found.path, history, journal, found.lock, tuple(found.notes), digest=found.digest)
+
+
+def _replay(old: JournalContents, commands: CommandTable, saved: ContactDocument | None) -> Replayed | None:
+    try:
+        return replay(old, commands, saved)
+    except FileRefused:  # nothing is known to begin with
+        return None
+
+
+def _belongs(old: JournalContents, replayed: Replayed, found: _Found) -> bool:
     """Whether a journal speaks of this document file: it names it, or leads to what it holds (the session ended
-    between writing the file and saying so)."""
-    return _names(old, digest) or same_documents(replay(old, commands)[0].document, document)
+    between writing the file and saying so, or the line that said so is lost)."""
+    if _names(old, found.digest):
+        return True
+    history = replayed.history
+    if old.damage is None:
+        return same_documents(history.document, found.document)
+    digest = document_digest(found.document)
+    revisions = [history.base_revision, *(step.revision for step in history.steps)]
+    return any(document_digest(history.document_at(revision)) == digest for revision in reversed(revisions))
 
 
 def _names(old: JournalContents, digest: str | None) -> bool:
-    return digest == old.file_digest or digest in old.saved_revisions
+    return (old.base is not None and digest == old.file_digest) or digest in old.saved_revisions
 
 
 def _read_old_journal(beside: Path) -> tuple[JournalContents | None, list[str]]:
@@ -165,54 +232,53 @@ def _read_old_journal(beside: Path) -> tuple[JournalContents | None, list[str]]:
         return None, [f"{error} It is kept as {_keep(beside, 'damaged').name}."]
 
 
-def _resume(
-    path: Path,
-    lock: DocumentLock,
-    old: JournalContents,
-    document: ContactDocument | None,
-    digest: str | None,
-    notes: list[str],
-    commands: CommandTable,
-) -> OpenedFile:
-    """Go on with the journal of a session that was interrupted. document, digest: of the file, None without one."""
-    beside = journal_path(path)
-    history, trouble = replay(old, commands)
-    history.mark_saved(_saved_revision(old, history, document, digest))
-    if old.damage or trouble:
+def _resume(found: _Found, old: JournalContents, replayed: Replayed) -> OpenedFile:
+    """Go on with the journal of a session that was interrupted."""
+    history, beside = replayed.history, found.journal
+    saved = _saved_revision(old, history, found)
+    history.mark_saved(saved)
+    sound = not (old.damage or replayed.trouble)
+    if not sound:
         kept = _keep(beside, "damaged", copy=True)
-        notes.append(f"{old.damage or trouble} The whole journal is kept as {kept.name}.")
-    sound = not (old.damage or trouble or old.closed)
-    if sound and document is not None and _names(old, digest):
-        journal = Journal(beside)
-    else:  # whole, of what was replayed, and naming the file as it is now
-        journal = Journal.start(beside, history, digest)
-    if document is None or not same_documents(history.document, document):
-        steps = len(history.done)
-        notes.append(
-            f"{path.name} was not closed in order: {steps} committed steps were recovered from its journal."
-        )
-    return OpenedFile(path, history, journal, lock, tuple(notes), digest=digest)
+        told = " ".join(sentence for sentence in (old.damage, *replayed.trouble) if sentence)
+        found.notes.append(f"{told} The whole journal is kept as {kept.name}.")
+    found.notes.append(_outcome(found, history))
+    if sound and not old.closed and not found.damaged and _names(old, found.digest):
+        journal = Journal(beside, old.last_number, old.journal_id)
+    else:  # of what was replayed, and naming the file as it is now
+        journal = Journal.start(beside, history, found.digest)
+        if saved is not None and found.digest is not None:
+            journal.saved(saved, found.digest)
+    return OpenedFile(found.path, history, journal, found.lock, tuple(found.notes), digest=found.digest)
 
 
-def _saved_revision(
-    old: JournalContents, history: History, document: ContactDocument | None, digest: str | None
-) -> int | None:
+def _outcome(found: _Found, history: History) -> str:
+    name = found.path.name
+    if not found.damaged and same_documents(history.document, found.document):
+        return f"{name} was not closed in order; its journal records no edit that is not saved."
+    return f"{name} was not closed in order: {len(history.done)} committed steps were recovered from its journal."
+
+
+def _saved_revision(old: JournalContents, history: History, found: _Found) -> int | None:
     """The revision that the document file holds, None where it holds none of this history."""
-    if document is None:
+    if found.damaged:
         return None
     for revision in (history.revision, history.base_revision):
-        if same_documents(history.document_at(revision), document):
+        if same_documents(history.document_at(revision), found.document):
             return revision
-    return old.saved_revisions.get(digest or "")
+    return old.saved_revisions.get(found.digest or "")
 
 
 def _keep(path: Path, why: str, *, copy: bool = False) -> Path:
-    """Move (or copy) a file aside under the first free name."""
+    """Move (or copy) a file aside under the first free name. Raises FileRefused."""
     number = 1
-    while (aside := path.with_name(f"{path.name}.{why}-{number}")).exists():
+    while os.path.lexists(aside := path.with_name(f"{path.name}.{why}-{number}")):
         number += 1
-    if copy:
-        shutil.copy2(path, aside)
-    else:
-        path.replace(aside)
+    try:
+        if copy:
+            write_atomic(aside, path.read_bytes())
+        else:
+            path.replace(aside)
+    except OSError as error:
+        raise FileRefused(f"cannot keep {path} as {aside.name}: {error.strerror or error}.") from error
     return aside

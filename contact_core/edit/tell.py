@@ -16,8 +16,9 @@ from contact_core.document.document import ContactDocument, Patch
 from contact_core.document.schema import dump_document
 from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
 from contact_core.edit.history import History
-from contact_core.edit.journal import read_journal, replay
+from contact_core.edit.journal_file import read_journal
 from contact_core.edit.recovery import journal_path, read_document, write_document
+from contact_core.edit.replay import replay
 from contact_core.errors import FileRefused
 
 
@@ -28,14 +29,15 @@ def history_lines(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> lis
     """
     journal = _journal_of(path)
     contents = read_journal(journal)
-    history, trouble = replay(contents, commands)
+    replayed = replay(contents, commands)
+    history = replayed.history
     lines = [f"{journal.name}: {_count(len(history.steps), 'step')} from revision {history.base_revision}"]
     done = len(history.done)
     for number, step in enumerate(history.steps, start=1):
         mark = ">" if number == done else " " if number < done else "-"
         origin = "" if step.origin == "user" else f"  ({step.origin})"
         lines.append(f"{mark} {step.revision:5d}  {_printable(step.command.label() + origin)}")
-    lines += [f"! {sentence}" for sentence in (contents.damage, trouble) if sentence]
+    lines += [f"! {sentence}" for sentence in (contents.damage, *replayed.trouble) if sentence]
     lines.append("closed in order" if contents.closed else "not closed: the session runs, or was interrupted")
     return lines
 
@@ -43,9 +45,10 @@ def history_lines(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> lis
 def replay_lines(path: Path, output: Path | None = None, commands: CommandTable = BUILT_IN_COMMANDS) -> list[str]:
     """Replay a journal (or that of a document) and say what came of it; write the document to `output` if given."""
     contents = read_journal(_journal_of(path))
-    history, trouble = replay(contents, commands)
+    replayed = replay(contents, commands)
+    history = replayed.history
     lines = [f"replayed {_count(contents.edits, 'event')} to revision {history.revision}: {_summary(history)}"]
-    lines += [f"! {sentence}" for sentence in (contents.damage, trouble) if sentence]
+    lines += [f"! {sentence}" for sentence in (contents.damage, *replayed.trouble) if sentence]
     if output is not None:
         if output.exists():
             raise FileRefused(f"{output} exists already; a replay overwrites nothing.")

@@ -8,8 +8,9 @@ from contact_core.document import library, schema
 from contact_core.document.codec import pretty, to_json
 from contact_core.document.library import load_contact_set
 from contact_core.document.schema import dump_document, parse_document
-from contact_core.edit import journal
-from contact_core.edit.journal import read_journal, replay
+from contact_core.edit import journal_file as journal
+from contact_core.edit.journal_file import read_journal
+from contact_core.edit.replay import replay
 
 
 def golden(repository: Path, kind: str) -> dict[int, Path]:
@@ -46,6 +47,6 @@ def test_contact_sets_are_read(repository: Path) -> None:
 def test_journals_are_replayed(repository: Path) -> None:
     for path in golden(repository, "journal").values():
         contents = read_journal(path)
-        history, trouble = replay(contents)
-        assert trouble is None and contents.damage is None and contents.closed
-        assert len(history.done) == sum("do" in event for event in contents.events)
+        replayed = replay(contents)
+        assert replayed.trouble == () and contents.damage is None and contents.closed
+        assert len(replayed.history.done) == sum("do" in event for event in contents.events)

@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 
 from contact_core.cli import main
 from contact_core.document.document import ContactDocument
-from contact_core.document.schema import document_to_json, dump_document
+from contact_core.document.schema import document_digest, document_to_json, dump_document
 from contact_core.edit.commands import SetExtra
 from contact_core.edit.history import History
-from contact_core.edit.journal import encode_line, read_journal, replay
+from contact_core.edit.journal_file import decode_line, encode_line, read_journal
 from contact_core.edit.recovery import accept_file, journal_path, read_only_document, write_document
+from contact_core.edit.replay import replay
 from contact_core.errors import CommandRejected, FileRefused
 from contact_core.session import Session
 from contact_core.testing.random_commands import random_history
@@ -29,6 +30,15 @@ def interrupt(session: Session) -> None:
     """Let go as a killed process does: the journal has no end, and the next opening replays it."""
     assert session._file is not None
     session._file.close(in_order=False)
+
+
+EMPTY_ID = document_digest(ContactDocument())[:8]
+
+
+def next_line(journal: Path, event: dict[str, Any]) -> bytes:
+    """The line that a journal would get for an event."""
+    contents = read_journal(journal)
+    return encode_line(event, contents.last_number + 1, contents.journal_id)
 
 
 def kept_beside(path: Path) -> list[bytes]:
@@ -119,7 +129,7 @@ def test_a_crash_between_writing_the_file_and_noting_it_keeps_the_history(tmp_pa
     write_document(path, session.document)
     interrupt(session)
     session = Session.open(path, discover=False)
-    assert session.notes == () and session.history.is_clean and session.history.can_undo
+    assert "no edit that is not saved" in session.notes[0] and session.history.is_clean and session.history.can_undo
     session.do(SetExtra("b", 2))  # and the crash after that
     interrupt(session)
     with Session.open(path, discover=False) as again:
@@ -137,7 +147,7 @@ def test_a_journal_that_cannot_be_replayed_to_its_end_goes_on_from_there(tmp_pat
     interrupt(session)
     beside = journal_path(path)
     lost = {"at": 9, "do": {"command": "contact.of an absent plugin"}, "origin": "user"}
-    beside.write_bytes(beside.read_bytes() + encode_line(lost))
+    beside.write_bytes(beside.read_bytes() + next_line(beside, lost))
     whole = beside.read_bytes()
     session = Session.open(path, discover=False)
     assert "the plugin that brings it is absent" in session.notes[0] and session.history.is_clean
@@ -174,7 +184,7 @@ def test_saving_over_an_interrupted_document_keeps_its_journal(tmp_path: Path) -
     with Session(discover=False) as other:
         other.save(tmp_path / "b.json")
         assert "is kept as b.json.journal.unused-1" in other.notes[0]
-    kept = replay(read_journal(tmp_path / "b.json.journal.unused-1"))[0]
+    kept = replay(read_journal(tmp_path / "b.json.journal.unused-1")).history
     assert dict(kept.document.extras) == {"precious": 1}
 
 
@@ -334,18 +344,23 @@ EVENTS: list[Any] = [
 
 
 @pytest.mark.parametrize("event", EVENTS, ids=repr)
-def test_an_event_that_nobody_wrote_ends_the_replay_in_a_sentence(tmp_path: Path, event: Any) -> None:
+def test_an_event_that_nobody_wrote_is_left_out_in_a_sentence(tmp_path: Path, event: Any) -> None:
     path = tmp_path / "document.json"
     session = Session.open(path, discover=False)
     session.do(SetExtra("sound", 1))
     session.do(SetExtra("sound", 2))
     interrupt(session)
-    raw = journal_path(path).read_bytes()
-    lines = raw.splitlines(keepends=True)
-    journal_path(path).write_bytes(b"".join(lines[:2]) + encode_line(event) + lines[2])
+    lines = journal_path(path).read_bytes().splitlines(keepends=True)
+    last = decode_line(lines[2])
+    assert last is not None
+    lines[2:] = [encode_line(event, 3, EMPTY_ID), encode_line(last.event, 4, EMPTY_ID)]
+    journal_path(path).write_bytes(b"".join(lines))
     with Session.open(path, discover=False) as again:
-        assert dict(again.document.extras) == {"sound": 1}
         assert "the event on line 3 cannot be replayed: " in again.notes[0]
+        assert "Replayed without what is lost before: 1 step;" in again.notes[0]
+        assert dict(again.document.extras) == {"sound": 2}
+        again.undo()
+        assert dict(again.document.extras) == {"sound": 1}
         again.close(discard=True)
 
 
@@ -356,9 +371,10 @@ def test_a_whole_line_that_is_no_event_is_damage(tmp_path: Path, body: bytes) ->
     session.do(SetExtra("sound", 1))
     interrupt(session)
     beside = journal_path(path)
+    body = b"3 %b %b" % (EMPTY_ID.encode(), body)
     beside.write_bytes(beside.read_bytes() + b"%08x %b\n" % (zlib.crc32(body), body))
     with Session.open(path, discover=False) as again:
-        assert dict(again.document.extras) == {"sound": 1} and "line 3 of" in again.notes[0]
+        assert dict(again.document.extras) == {"sound": 1} and "follows line 2 of" in again.notes[0]
         again.close(discard=True)
 
 
@@ -370,7 +386,8 @@ def test_a_whole_line_that_is_no_event_is_damage(tmp_path: Path, body: bytes) ->
 def test_a_first_line_that_nobody_wrote_is_kept_and_said(tmp_path: Path, change: dict[str, Any]) -> None:
     head = {"journal": "contact-core.journal", "version": 1, "revision": 0, "file": None}
     path = tmp_path / "document.json"
-    line = encode_line({**head, "document": document_to_json(ContactDocument()), **change})
+    head = {**head, "document": document_to_json(ContactDocument()), **change}
+    line = encode_line(head, 1, EMPTY_ID)
     journal_path(path).write_bytes(line)
     with Session.open(path, discover=False) as session:
         assert "is kept as document.json.journal.damaged-1" in session.notes[0]

@@ -83,7 +83,7 @@ def test_a_damaged_journal_is_told(tmp_path: Path) -> None:
     session.close(discard=True)
     beside = path.with_name("document.json.journal")
     beside.write_bytes(beside.read_bytes()[:-30])
-    assert any(line.startswith("! line") for line in history_lines(path))
+    assert any(line.startswith("! What follows line") for line in history_lines(path))
 
 
 def test_files_that_are_missing_are_named(tmp_path: Path) -> None:
