@@ -33,7 +33,7 @@ from contact_core.arrays import FloatArray
 from contact_core.geometry.inside import depth_inside
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
-from contact_core.job.solving import pose_problem
+from contact_core.job.solving import settings_of
 from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.rig.rig import skin
@@ -59,7 +59,7 @@ class Grip:
         example = HERE.parent / "examples" / f"{name}.toml"
         recipe = demo_recipe(name) if name in DEMOS else load_recipe(frozen if name in GRIPS else example)
         self.job: Job = prepare(recipe, PLUGINS)
-        self.problem = pose_problem(self.job, PLUGINS, self.job.start)
+        self.problem = self.job.session.problem(settings_of(self.job).objective)
 
     def depth(self, problem: PoseProblem, theta: FloatArray) -> float:
         """Of the deepest skin vertex in the true solids, in % of the length: no grid comes in between."""

@@ -22,7 +22,6 @@ from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
-from contact_core.job.solving import pose_problem
 from contact_core.plugins.manager import PluginManager
 from contact_core.rig.poses import blend
 from contact_core.rig.rig import skin
@@ -103,7 +102,7 @@ def grip(recipe: str) -> PoseProblem:
     """The problem of an example recipe, with the paper's three terms."""
     plugins = PluginManager()
     job = prepare(load_recipe(REPOSITORY / "examples" / recipe), plugins)
-    return replace(pose_problem(job, plugins, job.start), terms=paper_terms())
+    return job.session.problem()
 
 
 def ablation(name: str, problem: PoseProblem, solver: PoseSolver) -> tuple[list[str], list[Judged]]:

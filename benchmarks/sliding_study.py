@@ -21,7 +21,8 @@ from contact_core.job.workpiece import OBJECT, Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.proposals import PENALTY, SLACK
 from contact_core.proposals.draft import Draft
-from contact_core.proposals.proposal import ProposalSettings, slide
+from contact_core.proposals.proposal import SolveSettings, slide
+from contact_core.scene.problem import Objective
 
 HERE = Path(__file__).resolve().parent
 FOLDERS = (HERE.parent / "examples", HERE / "grips")
@@ -73,10 +74,12 @@ def _performed(recipe: Recipe, slack: float) -> tuple[Job, Mapping[str, Any]]:
 def _times(job: Job) -> tuple[float, float]:
     """Milliseconds of a slide from the solved pose: of this process, and by the clock."""
     took = []
-    settings = ProposalSettings(terms=job.solution.problem.terms, solids={OBJECT: job.solids} if job.solids else {})
+    settings = SolveSettings(
+        objective=Objective(job.solution.problem.terms), solids={OBJECT: job.solids} if job.solids else {}
+    )
     for _ in range(TIMED + 1):
         draft = Draft(job.session.document, job.session.derived, job.session.rigs)
         processor, clock = time.process_time(), time.perf_counter()
-        slide(draft, PLUGINS, 0, settings)
+        slide(draft.document, draft, PLUGINS, 0, settings)
         took.append((1e3 * (time.process_time() - processor), 1e3 * (time.perf_counter() - clock)))
     return median(t[0] for t in took[1:]), median(t[1] for t in took[1:])

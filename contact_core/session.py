@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from contact_core.document.document import ContactDocument
+from contact_core.document.document import ContactDocument, Surface
+from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.announcer import Announcer, DocumentChanged, Listener
 from contact_core.edit.command import Command
 from contact_core.edit.command_table import BUILT_IN_COMMANDS
@@ -26,8 +26,12 @@ from contact_core.plugins.verbs import PluginVerbs
 from contact_core.proposals.verbs import ProposalVerbs
 
 if TYPE_CHECKING:
+    from contact_core.document.asset import Asset
     from contact_core.geometry.engine import GeodesicEngine
+    from contact_core.plugins.manager import PluginManager
     from contact_core.proposals.proposal import Proposal
+    from contact_core.rig.rig import Pose
+    from contact_core.scene.binding import Binding
     from contact_core.scene.link import HostLink
 
 log = logging.getLogger(__name__)
@@ -39,12 +43,16 @@ __all__ = ["DocumentChanged", "Session"]
 class Session(PluginVerbs, ProposalVerbs):
     """Edits one document.
 
-    document: to start from, empty by default. plugins: modules or objects with hook implementations, of highest
-    precedence; discover: whether entry points are read. engine: the geodesic engine, or its name, that measures
-    the coordinates of painted points; the exact one by default. Use `Session.open` for a document file, and
-    `add_surface` for every mesh. Verbs (`paint`, `translate`, `transfer` ...) commit commands; `stroke` gathers a
-    drag into one, `macro` several commands. Use it as a context manager, or call `close`. It is for one thread at a
-    time: while one is in an edit, a stroke or a macro, what another thread commits is refused in words.
+    document: to start from, empty by default. host: the scene in which the document lives; surfaces that the
+    document knows are bound to its objects at once, with their meshes and rigs. objects: ids or names of further
+    objects that become surfaces, None for all where the document knows none. surfaces: object ids by surface, for
+    those that cannot be told. plugins: a manager to share, or modules or objects with hook implementations, of
+    highest precedence; discover: whether entry points are read. engine: the geodesic engine, or its name, that
+    measures the coordinates of painted points; the exact one by default. Use `Session.open` for a document file,
+    and `add_surface` for every mesh. Verbs (`paint`, `translate`, `transfer` ...) commit commands; `stroke`
+    gathers a drag into one, `macro` several commands. Use it as a context manager, or call `close`. It is for one
+    thread at a time: while one is in an edit, a stroke or a macro, what another thread commits is refused in
+    words.
     """
 
     def __init__(
@@ -52,7 +60,9 @@ class Session(PluginVerbs, ProposalVerbs):
         document: ContactDocument | None = None,
         *,
         host: Any = None,
-        plugins: Iterable[object] = (),
+        objects: Iterable[str] | None = (),
+        surfaces: Mapping[str, str] | None = None,
+        plugins: PluginManager | Iterable[object] = (),
         discover: bool = True,
         engine: str | GeodesicEngine | None = None,
     ) -> None:
@@ -68,6 +78,7 @@ class Session(PluginVerbs, ProposalVerbs):
         if engine is not None:
             self._derived.engine = self.named_engine(engine) if isinstance(engine, str) else engine
         self.host = host
+        self._binding: Binding | None = None
         self._host_link: HostLink | None = None
         if host is not None:
             from contact_core.scene.link import HostLink
@@ -75,8 +86,53 @@ class Session(PluginVerbs, ProposalVerbs):
             link = HostLink(self, host)
             if document is None:
                 self.history = link.stored_history() or self.history
+            self.history = self._bound(self.history, surfaces, objects)
             link.listen()  # last: a session that refuses its document leaves nothing behind in the host
             self._host_link = link
+
+    def _bound(
+        self, history: History, told: Mapping[str, str] | None = None, objects: Iterable[str] | None = ()
+    ) -> History:
+        """A history that begins with its surfaces bound to the scene: opening is no edit, and writes nothing."""
+        document = self.binding.bind(history.document, told)
+        chosen = None if objects is None else tuple(objects)
+        if chosen or (objects is None and not document.surfaces):
+            document = self.binding.with_objects(document, chosen)
+        for name, found in self.binding.surfaces.items():
+            self.known_meshes[found.asset.mesh.digest] = found.asset.mesh
+            if found.rig is not None:
+                self.rigs[name] = found.rig
+        return history if document is history.document else History(document, history.revision)
+
+    def bring(self, surface: Surface, object_id: str | None = None) -> Surface:
+        """Add a surface of another document, bound to the object of this scene that has its triangles.
+
+        object_id: where several have. Raises InvalidInput where there is none.
+        """
+        found = self.binding.find(surface, object_id)
+        self.binding.surfaces[surface.name] = found
+        asset = found.asset
+        return self.add_surface(
+            surface.name,
+            asset.mesh,
+            rig=asset.rig,
+            meters_per_unit=asset.meters_per_unit or 1.0,
+            up_axis=asset.up_axis,
+            world_from_surface=self.host.placement(found.object_id),
+        )
+
+    @classmethod
+    def of_assets(cls, assets: Mapping[str, Asset], **arguments: Any) -> Session:
+        """A session on a new document with a surface for each asset, by name. arguments: as for Session."""
+        from contact_core.scene.binding import surface_of
+
+        surfaces = {name: surface_of(name, asset) for name, asset in assets.items()}
+        session = cls(ContactDocument(surfaces=FrozenMap(surfaces)), **arguments)
+        for name, asset in assets.items():
+            session.known_meshes[asset.mesh.digest] = asset.mesh
+            if asset.rig is not None:
+                session.rigs[name] = asset.rig
+        return session
 
     # -- files ---------------------------------------------------------------------------------------------------
 
@@ -105,19 +161,26 @@ class Session(PluginVerbs, ProposalVerbs):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what opening the file found."""
-        return self._file.notes if self._file is not None else ()
+        """Sentences on what opening the file or the scene found."""
+        own = self._file.notes if self._file is not None else ()
+        return own + (tuple(self._binding.missing.values()) if self._binding is not None else ())
 
     @property
     def read_only(self) -> bool:
         """Whether someone else has the document, so that nothing can be committed here."""
         return self._file is not None and self._file.read_only is not None
 
-    def save(self, path: Path | str | None = None) -> Path:
-        """Write the document file, whole or not at all. With a new path the session goes on there.
+    def save(self, path: Path | str | None = None) -> Path | None:
+        """Write the document, atomically; returns the document file. With a new path the session goes on there.
 
-        Raises FileRefused; what was on the disk is untouched then.
+        In a host that keeps documents, the host's own file is written instead, where it came from or at a path with
+        one of the host's suffixes, and None is returned. Raises FileRefused; what is on the disk is then untouched.
         """
+        if self._file is None and self._host_link is not None and self._host_link.saves(path):
+            with self._under_way.alone():
+                self._host_link.save(path)
+                self.history.mark_clean()
+            return None
         target = real_path(Path(path)) if path is not None else self.path
         if target is None:
             raise FileRefused("this document has no file yet: save it with a path.")
@@ -143,6 +206,7 @@ class Session(PluginVerbs, ProposalVerbs):
             if link is not None:
                 link.close()
         finally:
+            self.host, self._binding = None, None  # the scene ends with its last holder
             if self._file is not None:
                 self._file.close(in_order=discard or self.history.is_clean)
 
@@ -165,16 +229,33 @@ class Session(PluginVerbs, ProposalVerbs):
         return self._derived
 
     @property
+    def binding(self) -> Binding:
+        """Which objects of the host stand behind the surfaces of the document; empty without a host."""
+        if self._binding is None:
+            from contact_core.scene.binding import Binding
+
+            self._binding = Binding(self.host)
+        return self._binding
+
+    @property
     def revision(self) -> int:
         """Revision of the committed document."""
         return self.history.revision
 
-    def do(self, command: Command, *, origin: str = "user", merge: bool = False) -> int:
-        """Commit a command; answers the new revision. It is in the journal when this returns.
+    def do(
+        self,
+        command: Command,
+        *,
+        origin: str = "user",
+        merge: bool = False,
+        keys: Mapping[float, Mapping[str, Pose]] | None = None,
+    ) -> int:
+        """Commit a command; returns the new revision. It is in the journal when this returns.
 
         merge: where the command before agrees, both become one undo step; not inside a host with undo, whose own
-        steps cannot be joined: use a stroke there. Raises CommandRejected, or FileRefused when it cannot be
-        recorded; then nothing has changed.
+        steps cannot be joined: use a stroke there. keys: by frame, poses by surface that are keyed in the scene, in
+        the same undo step. Raises CommandRejected, or FileRefused when it cannot be recorded; then nothing has
+        changed.
         """
         with self._under_way.alone():
             self._check_writable()
@@ -184,7 +265,9 @@ class Session(PluginVerbs, ProposalVerbs):
             host_keeps_steps = self._host_link is not None and self._host_link.has_undo
             step = self.history.prepare(command, origin, merge=merge and not host_keeps_steps)
             before = self.history.document
-            with self._in_host(step.command.label(), step.after, step.revision):
+            with self._in_host(step.command.label(), before, step.after, step.revision):
+                for frame, poses in (keys or {}).items():
+                    self.binding.write(poses, frame)
                 if self._file is not None:
                     self._file.did(step)
                 self.history.commit(step)
@@ -226,7 +309,7 @@ class Session(PluginVerbs, ProposalVerbs):
             else:
                 step = self.history.undo() if kind == "undo" else self.history.redo()
             try:
-                self._record_move(origin)
+                self._record_move(before, origin)
             except BaseException:
                 self.history.goto(came_from)
                 raise
@@ -236,10 +319,11 @@ class Session(PluginVerbs, ProposalVerbs):
             )
             return self.revision
 
-    def _record_move(self, origin: str) -> None:
+    def _record_move(self, before: ContactDocument, origin: str) -> None:
         """Tell host and journal where the history went, the host only when it was not the one who asked."""
         title = f"Go to revision {self.revision}"
-        with _warned() if origin == "host" else self._in_host(title, self.history.document, self.revision):
+        after = self.history.document
+        with _warned() if origin == "host" else self._in_host(title, before, after, self.revision):
             if self._file is not None:
                 self._file.went(self.revision)
 
@@ -247,11 +331,11 @@ class Session(PluginVerbs, ProposalVerbs):
         """Go on with another history: the host brought a document that this one does not know."""
         with self._under_way.alone():
             self._under_way.abandon()
-            before, self.history = self.history.document, history
+            before, self.history = self.history.document, self._bound(history)
             if self._file is not None:
                 with _warned():
                     self._file.restart(history)
-            self._announcer.tell(DocumentChanged("goto", before, history.document, history.revision, None, "host"))
+            self._announcer.tell(DocumentChanged("goto", before, self.document, self.revision, None, "host"))
 
     @contextlib.contextmanager
     def macro(self, title: str) -> Iterator[Session]:
@@ -318,10 +402,17 @@ class Session(PluginVerbs, ProposalVerbs):
         self._check_writable()
         self._under_way.check_nothing()
 
-    def _in_host(self, label: str, document: ContactDocument, revision: int) -> AbstractContextManager[None]:
+    @contextlib.contextmanager
+    def _in_host(
+        self, label: str, before: ContactDocument, after: ContactDocument, revision: int
+    ) -> Iterator[None]:
+        """One undo step of the host in which document and scene change together."""
         if self._host_link is None:
-            return contextlib.nullcontext()
-        return self._host_link.recording(label, document, revision)
+            yield
+            return
+        with self._host_link.recording(label, after, revision):
+            self.binding.follow(before, after)
+            yield
 
     def _preview(self, start: ContactDocument, shown: ContactDocument) -> None:
         self._announcer.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))

@@ -14,7 +14,7 @@ from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.job.recipe import AssetSource, ObjectSpec
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import FORMATS, SAMPLES
+from contact_core.plugins.reading import SAMPLE, read_asset
 
 _MOST_LENGTHS = 1e4  # that an object is larger or smaller than the manipulator: a hand holds a pin, and a hull
 
@@ -22,25 +22,14 @@ _MOST_LENGTHS = 1e4  # that an object is larger or smaller than the manipulator:
 def read_source(source: AssetSource, plugins: PluginManager, folder: Path | None = None) -> Asset:
     """The asset that a recipe names. Raises FileRefused, InvalidInput."""
     if source.sample is not None:
-        return plugins.get(SAMPLES, source.sample).build()
+        return read_asset(SAMPLE + source.sample, plugins)
     path = find_file(source, folder)
     sidecar = None
     if source.sidecar is not None:
         sidecar = (folder or Path.cwd()) / source.sidecar
         if not sidecar.is_file():
             raise FileRefused(f"there is no rig sidecar {sidecar}; name a file that is, relative to the recipe.")
-    return read_file(path, plugins, sidecar=sidecar)
-
-
-def read_file(path: Path, plugins: PluginManager, *, sidecar: Path | None = None) -> Asset:
-    """Read a file by the format that its suffix names. Raises FileRefused."""
-    suffix = path.suffix.lower()
-    readers = [format_ for format_ in plugins.offers(FORMATS).values() if format_.can_read]
-    for reader in readers:
-        if suffix in reader.suffixes:
-            return reader.read(path, sidecar=sidecar)
-    known = ", ".join(sorted({s for reader in readers for s in reader.suffixes}))
-    raise FileRefused(f"no reader for {path.name}: {suffix or 'a name without suffix'} is none of {known}.")
+    return read_asset(path, plugins, sidecar=sidecar)
 
 
 def find_file(source: AssetSource, folder: Path | None = None) -> Path:

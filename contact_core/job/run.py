@@ -65,13 +65,13 @@ def run(
 def perform(recipe: Recipe, plugins: PluginManager, *, progress: Progress = NO_PROGRESS) -> Job:
     """All of a job but its files: read, paint, place, solve, measure. Raises ContactError."""
     job = prepare(recipe, plugins, progress=progress)
-    _solve(job, plugins)
+    _solve(job)
     return job
 
 
 def prepare(recipe: Recipe, plugins: PluginManager, *, progress: Progress = NO_PROGRESS) -> Job:
-    """A job up to its solve: read, painted, placed and paired; `solving.pose_problem` makes its problem."""
-    job = Job(recipe, Session(discover=False), progress)
+    """A job up to its solve: read, painted, placed and paired; `job.session.problem` makes its problem."""
+    job = Job(recipe, Session(plugins=plugins), progress)
     _read(job, plugins)
     _paint(job, plugins)
     _place(job, plugins)
@@ -170,10 +170,10 @@ def _start(job: Job) -> tuple[Pose, float]:
     return pose, distance
 
 
-def _solve(job: Job, plugins: PluginManager) -> None:
+def _solve(job: Job) -> None:
     with job.stage("solve", 0.45, "Solving the pose"):
-        solve(job, plugins)
-        move_contacts(job, plugins)
+        solve(job)
+        move_contacts(job)
     job.progress.tell(0.7, "Measuring")
     job.metrics = measure(posed_scene(job, job.pose))
     job.verdict = judge(job.metrics, job.placement.left_out, job.recipe.accept)

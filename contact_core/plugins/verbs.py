@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 class PluginVerbs(Verbs, SurfaceVerbs):
     """An editor with a plugin manager of its own, which looks for plugins at the first use."""
 
-    def _equip(self, plugins: Iterable[object], *, discover: bool) -> None:
-        """plugins: of highest precedence. discover: whether entry points are read."""
-        self._plugins: PluginManager | None = None
-        self._plugin_arguments = (tuple(plugins), discover)
+    def _equip(self, plugins: PluginManager | Iterable[object], *, discover: bool) -> None:
+        """plugins: a manager to share, or modules of highest precedence. discover: read entry points."""
+        given = plugins if isinstance(plugins, Iterable) else ()
+        self._plugins: PluginManager | None = None if isinstance(plugins, Iterable) else plugins
+        self._plugin_arguments = (tuple(given), discover)
 
     @property
     def plugins(self) -> PluginManager:

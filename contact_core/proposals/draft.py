@@ -4,24 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from contact_core.document.document import ContactDocument
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.edit.command import Command, apply_command
-from contact_core.edit.commands import Settle
+from contact_core.edit.command import Command, Macro, apply_command
+from contact_core.edit.commands import PlaceSurface, Settle
 from contact_core.edit.derived import Derived
-from contact_core.edit.pose_problem import pose_problem, surfaces_of
 from contact_core.edit.verbs import Verbs
-from contact_core.rig.rig import Pose, Rig
-from contact_core.solve.body import Body
-from contact_core.solve.problem import Limits, PoseProblem
-from contact_core.solve.terms import PoseTerm, paper_terms
+from contact_core.rig.rig import Rig
+from contact_core.scene.evaluated_rig import HostRig
+from contact_core.scene.problem import Objective, poses_of, problem_of
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution
 
 
 class Draft(Verbs):
-    """An editor of a document of its own. rigs: by surface."""
+    """An editor of a document of its own. rigs: by surface. evaluated: those whose skin only the host evaluates."""
 
-    def __init__(self, document: ContactDocument, derived: Derived, rigs: Mapping[str, Rig]) -> None:
-        self._document, self._derived, self.rigs = document, derived, dict(rigs)
+    def __init__(
+        self,
+        document: ContactDocument,
+        derived: Derived,
+        rigs: Mapping[str, Rig],
+        evaluated: Mapping[str, HostRig] | None = None,
+    ) -> None:
+        self._document, self._derived = document, derived
+        self.rigs, self.evaluated = dict(rigs), dict(evaluated or {})
 
     @property
     def document(self) -> ContactDocument:
@@ -34,36 +43,32 @@ class Draft(Verbs):
         return self._derived
 
     def submit(self, command: Command, *, origin: str = "user") -> int:
-        """Take a command into the draft; there are no revisions, so it answers 0."""
+        """Take a command into the draft; there are no revisions, so it returns 0."""
         self._document = apply_command(command, self._document)
         return 0
 
-    def problem(self, terms: tuple[PoseTerm, ...] = paper_terms(), *, limits: Limits = "rig") -> PoseProblem:
-        """All pairs, every rig in its pose, everything else where it stands. The world is the scene in the units of
-        the first surface."""
-        pairs = self.pairs()
-        names = surfaces_of(pairs)
-        unit = self.document.surface(names[0]).meters_per_unit if names else 1.0
+    def problem(self, objective: Objective | None = None) -> PoseProblem:
+        """The pose problem of the document as the draft has it now (`scene.problem.problem_of`)."""
+        return problem_of(self, self.rigs, objective, self.evaluated)
 
-        def body_of(name: str) -> Body:
-            record = self.document.surface(name)
-            world = record.world_from_surface.copy()
-            world[:3] *= record.meters_per_unit / unit
-            if name not in self.rigs:
-                return Body.rigid(name, self.mesh(name), world_from_surface=world)
-            rig = self.rigs[name]
-            pose = self.document.poses.get(name) or Pose.rest(rig)
-            return Body.skinned(rig, name=name, pose=pose, world_from_rig=world)
-
-        return pose_problem(pairs, body_of, terms, limits=limits)
+    def take(self, solution: PoseSolution) -> None:
+        """Pose the rigs as a solution has them."""
+        for name, pose in poses_of(solution, self.rigs).items():
+            self.set_pose(name, pose)
 
 
-def change(before: ContactDocument, after: ContactDocument, title: str) -> Settle:
+def change(before: ContactDocument, after: ContactDocument, title: str) -> Command:
     """The one command that takes a document to another, as far as placements and poses go."""
+    moved = tuple(
+        PlaceSurface(name, surface.world_from_surface)
+        for name, surface in after.surfaces.items()
+        if not np.array_equal(before.surface(name).world_from_surface, surface.world_from_surface)
+    )
     placements = tuple(
         (name, patch.placement)
         for name, patch in after.patches.items()
         if before.patch(name).placement != patch.placement
     )
     poses = {name: pose for name, pose in after.poses.items() if before.poses.get(name) is not pose}
-    return Settle(placements, FrozenMap(poses), title)
+    settled = Settle(placements, FrozenMap(poses), title)
+    return Macro(title, (*moved, settled)) if moved else settled

@@ -1,18 +1,18 @@
-"""Two ways to move contacts together with the pose, for when transferred ones do not fit: settle and slide.
+"""Proposals: solve the pose, settle the contacts, or let them slide with the pose.
 
-Neither is ever silent: each answers a `Proposal`, a ghost that a person looks at and accepts as one undo step.
+None is ever silent: each returns a `Proposal`, a ghost that a person looks at and accepts as one undo step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contact_core.document.document import ContactDocument
-from contact_core.edit.commands import Settle
+from contact_core.edit.command import Command
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.plugins.registry import PLACERS, POSE_SOLVERS
 from contact_core.plugins.slots import PlacementRequest
@@ -22,12 +22,14 @@ from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 from contact_core.proposals.draft import Draft, change
 from contact_core.proposals.sliding import solve_sliding
 from contact_core.proposals.sliding_targets import SlidingPatch
+from contact_core.rig.rig import Pose
+from contact_core.scene.problem import Objective, poses_of, world_from_surface
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import Solids
-from contact_core.solve.problem import Limits, PoseProblem
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.sequence import solve_sequence
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
-from contact_core.solve.terms import PoseTerm, paper_terms
 
 if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
@@ -38,24 +40,32 @@ AGAIN = ("current",)  # starting candidates once there is a pose
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Contacts moved with a pose, not yet committed.
+    """A pose, perhaps with contacts moved, not yet committed.
 
     command: what accepting commits. ghost: the document with it, which adapters show. revision: of the document
-    that it was made for. before, after: solutions with the contacts where they were, and as proposed. left_out:
-    pairs that stay where they are, with the reason.
+    that it was made for. before, after: solutions with the contacts where they were, and as proposed; the same
+    where no contact moves. left_out: pairs that stay where they are, with the reason. keys: by frame, the poses by
+    surface that accepting keys in the scene; empty for a solve without frames. solutions: one for each frame.
     """
 
-    command: Settle
+    command: Command
     ghost: ContactDocument
     revision: int
     before: PoseSolution
     after: PoseSolution
-    left_out: Mapping[str, str]
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    keys: Mapping[float, Mapping[str, Pose]] = field(default_factory=dict)
+    solutions: tuple[PoseSolution, ...] = ()
+
+    @property
+    def poses(self) -> Mapping[str, Pose]:
+        """By surface, the poses that it proposes (those of the last frame)."""
+        return self.ghost.poses
 
 
 @dataclass(frozen=True, eq=False)
-class ProposalSettings:
-    """How to solve. solver: a name; None leaves the choice to the plugins. terms, limits: of the problem.
+class SolveSettings:
+    """How to solve. solver: a name; None leaves the choice to the plugins. objective: terms, limits, what is free.
 
     solids: closed meshes by surface, in its space, whose inside is out of bounds; by default each surface that
     does not bend is its own. Give filled bodies of what is hollow.
@@ -63,9 +73,8 @@ class ProposalSettings:
 
     solver: str | None = None
     options: SolveOptions | None = None
-    terms: tuple[PoseTerm, ...] = paper_terms()
+    objective: Objective = field(default_factory=Objective)
     progress: Progress = NO_PROGRESS
-    limits: Limits = "rig"
     solids: Solids | None = None
 
     def solver_of(self, plugins: PluginManager) -> PoseSolver:
@@ -73,12 +82,67 @@ class ProposalSettings:
         by_plugin = self.solver is not None or plugins.offers(POSE_SOLVERS)
         return PluginSolver(plugins, self.solver) if by_plugin else LevenbergMarquardt()
 
+    def options_of(self, draft: Draft) -> SolveOptions:
+        """The options; by default a rig that has a pose starts from it alone."""
+        posed = any(name in draft.rigs for name in draft.document.poses)
+        return self.options or (SolveOptions(candidates=AGAIN) if posed else SolveOptions())
+
+
+def solve(
+    start: ContactDocument, draft: Draft, plugins: PluginManager, revision: int, settings: SolveSettings
+) -> Proposal:
+    """The pose that brings the pairs of the draft together. start: the document that accepting changes; the draft's
+    may have things placed and posed as the scene has them."""
+    problem = _problem(draft, settings, "solving")
+    solution = settings.solver_of(plugins).solve(problem, settings.options_of(draft), settings.progress)
+    draft.take(solution)
+    command = change(start, draft.document, "Solve")
+    return Proposal(command, draft.document, revision, solution, solution, solutions=(solution,))
+
+
+def solve_frames(
+    start: ContactDocument,
+    drafts: Iterable[tuple[float, Draft]],
+    count: int,
+    plugins: PluginManager,
+    revision: int,
+    settings: SolveSettings,
+) -> Proposal:
+    """The poses at rising frames, each from the one before. drafts: `count` of them, the document
+    as the scene has it at each frame.
+
+    Raises Cancelled where not one frame was solved.
+    """
+    last: list[Draft] = []
+
+    def problems() -> Iterable[tuple[float, PoseProblem]]:
+        for frame, draft in drafts:
+            last[:] = [draft]
+            yield frame, _problem(draft, settings, "solving")
+
+    solved = solve_sequence(
+        settings.solver_of(plugins),
+        problems(),
+        prior="problem",
+        options=settings.options,
+        progress=settings.progress,
+        count=count,
+    )
+    if not solved.solutions:
+        raise Cancelled("it was cancelled before the first frame was solved; nothing is proposed.")
+    draft, after = last[0], solved.solutions[-1]
+    draft.take(after)
+    keys = {f: poses_of(s, draft.rigs) for f, s in zip(solved.frames, solved.solutions, strict=True)}
+    command = change(start, draft.document, "Solve and key")
+    return Proposal(command, draft.document, revision, after, after, keys=keys, solutions=solved.solutions)
+
 
 def settle(
+    start: ContactDocument,
     draft: Draft,
     plugins: PluginManager,
     revision: int,
-    settings: ProposalSettings,
+    settings: SolveSettings,
     rounds: int = ROUNDS,
     reach: float = REACH,
 ) -> Proposal:
@@ -87,15 +151,15 @@ def settle(
     The round with the lowest objective is proposed, only a pose where none improves on contacts left alone. reach:
     contacts farther away than this stay, in manipulator lengths.
     """
-    start, solver = draft.document, settings.solver_of(plugins)
-    problem, options = _problem_and_options(draft, settings)
+    solver, options = settings.solver_of(plugins), settings.options_of(draft)
+    problem = _problem(draft, settings, "settling")
     parts = [settings.progress.part(k / (rounds + 1), (k + 1) / (rounds + 1)) for k in range(rounds + 1)]
     before = after = _solved(draft, solver, problem, options, parts[0])
     best, left_out = draft.document, dict[str, str]()
     for part in parts[1:]:
-        left_out = _place_all(draft, plugins, problem, reach, settings.solids or {})
+        left_out = _place_all(draft, plugins, reach, settings.solids or {})
         again = replace(options, candidates=AGAIN)
-        moved = draft.problem(settings.terms, limits=settings.limits)
+        moved = draft.problem(settings.objective)
         solution = _solved(draft, solver, moved, again, part)
         if solution.value < after.value:
             best, after = draft.document, solution
@@ -104,10 +168,11 @@ def settle(
 
 
 def slide(
+    start: ContactDocument,
     draft: Draft,
     plugins: PluginManager,
     revision: int,
-    settings: ProposalSettings,
+    settings: SolveSettings,
     slack: float = SLACK,
     turn: float = TURN,
     penalty: float = PENALTY,
@@ -117,28 +182,25 @@ def slide(
 
     slack: in manipulator lengths. turn: radians.
     """
-    start = draft.document
-    problem, options = _problem_and_options(draft, settings)
+    unmoved = draft.document
+    problem, options = _problem(draft, settings, "sliding"), settings.options_of(draft)
     patches, left_out = _sliding_patches(draft, problem, slack, turn, penalty)
     slid = solve_sliding(settings.solver_of(plugins), problem, patches, options, settings.progress, settings.solids)
     _raise_if_cancelled(slid.solution)
     for contact, root in slid.roots.items():
-        name = start.pairs[contact].object
+        name = unmoved.pairs[contact].object
         if root != draft.root(name):
             draft.place(name, root.point(), heading=root.heading)
-    _take_poses(draft, slid.solution)
+    draft.take(slid.solution)
     command = change(start, draft.document, "Slide contacts")
     return Proposal(command, draft.document, revision, slid.fixed, slid.solution, left_out)
 
 
-def _problem_and_options(draft: Draft, settings: ProposalSettings) -> tuple[PoseProblem, SolveOptions]:
-    problem = draft.problem(settings.terms, limits=settings.limits) if draft.document.pairs else None
+def _problem(draft: Draft, settings: SolveSettings, act: str) -> PoseProblem:
+    problem = draft.problem(settings.objective) if draft.document.pairs else None
     if problem is None or not any(body.name in draft.rigs for body in problem.bodies):
-        raise InvalidInput(
-            "settling and sliding need contact pairs with a rig that can be posed: pair patches first."
-        )
-    posed = any(body.name in draft.document.poses for body in problem.bodies)
-    return problem, settings.options or (SolveOptions(candidates=AGAIN) if posed else SolveOptions())
+        raise InvalidInput(f"{act} needs contact pairs with a rig that can be posed: pair patches first.")
+    return problem
 
 
 def _solved(
@@ -146,19 +208,13 @@ def _solved(
 ) -> PoseSolution:
     solution = solver.solve(problem, options, progress)
     _raise_if_cancelled(solution)
-    _take_poses(draft, solution)
+    draft.take(solution)
     return solution
 
 
 def _raise_if_cancelled(solution: PoseSolution) -> None:
     if solution.status is SolveStatus.CANCELLED:
         raise Cancelled("it was cancelled; nothing is proposed.")
-
-
-def _take_poses(draft: Draft, solution: PoseSolution) -> None:
-    for name in draft.rigs:
-        if name in solution.poses:
-            draft.set_pose(name, solution.poses[name])
 
 
 def _bends(draft: Draft, contact: str) -> str:
@@ -170,9 +226,7 @@ def _bends(draft: Draft, contact: str) -> str:
     return "" if surfaces[0] in draft.rigs else f"{surfaces[0]} has no rig that is posed"
 
 
-def _place_all(
-    draft: Draft, plugins: PluginManager, problem: PoseProblem, reach: float, solids: Solids
-) -> dict[str, str]:
+def _place_all(draft: Draft, plugins: PluginManager, reach: float, solids: Solids) -> dict[str, str]:
     """One round: contacts to their closest facing points; answers those that stay, with the reason."""
     left_out = {name: why for name in draft.document.pairs if (why := _bends(draft, name))}
     groups: dict[tuple[str, str], list[str]] = {}
@@ -182,7 +236,7 @@ def _place_all(
             groups.setdefault(ends, []).append(name)
     for (hand, thing), names in groups.items():
         pairs = {name: draft.document.pairs[name] for name in names}
-        world = {body.name: body.world_from_rig for body in problem.bodies}
+        world = {name: world_from_surface(draft.document, name) for name in (hand, thing)}
         request = PlacementRequest(
             rig=draft.rigs[hand],
             pose=draft.document.poses[hand],

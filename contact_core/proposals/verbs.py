@@ -1,27 +1,41 @@
-"""The verbs of a session that propose: the answer is shown as a ghost until it is accepted or dismissed."""
+"""The verbs of a session that propose: the result is shown as a ghost until it is accepted or dismissed."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
 
 from contact_core.edit.verbs import SurfaceVerbs, Verbs
 from contact_core.errors import CommandRejected
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 
 if TYPE_CHECKING:
+    from contact_core.edit.command import Command
     from contact_core.plugins.manager import PluginManager
     from contact_core.proposals.draft import Draft
-    from contact_core.proposals.proposal import Proposal, ProposalSettings
+    from contact_core.proposals.proposal import Proposal, SolveSettings
+    from contact_core.rig.rig import Pose
+    from contact_core.scene.binding import Binding
+    from contact_core.scene.problem import Objective
+    from contact_core.solve.problem import Limits, PoseProblem
+    from contact_core.solve.solver import SolveOptions
+    from contact_core.solve.terms import PoseTerm
 
 
 class ProposalVerbs(Verbs, SurfaceVerbs):
-    """Settle, slide, accept, dismiss."""
+    """Solve, settle, slide, accept, dismiss."""
 
     @property
     @abstractmethod
     def plugins(self) -> PluginManager:
         """The plugins of the session."""
+
+    @property
+    @abstractmethod
+    def binding(self) -> Binding:
+        """Which objects of the scene stand behind the surfaces."""
 
     @property
     @abstractmethod
@@ -32,17 +46,73 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
     def show_ghost(self, ghost: Proposal | None) -> None:
         """Tell listeners of a preview; None: back to the document."""
 
+    @abstractmethod
+    def do(
+        self,
+        command: Command,
+        *,
+        origin: str = "user",
+        merge: bool = False,
+        keys: Mapping[float, Mapping[str, Pose]] | None = None,
+    ) -> int:
+        """Commit a command and key poses in the scene, as one undo step of document and scene."""
+
+    def solve(
+        self,
+        *,
+        frames: Sequence[float] | None = None,
+        solver: str | None = None,
+        terms: Iterable[str | PoseTerm] | None = None,
+        free: Mapping[str, Iterable[str]] | None = None,
+        held: Mapping[str, Iterable[str]] | None = None,
+        prior: Literal["rest", "current"] | Mapping[str, Pose] = "rest",
+        limits: Limits = "rig",
+        pairs: Iterable[str] | None = None,
+        options: SolveOptions | None = None,
+        progress: Progress = NO_PROGRESS,
+        settings: SolveSettings | None = None,
+    ) -> Proposal:
+        """Propose the pose that brings all pairs together, from where things stand in the scene now.
+
+        frames: solve and, when accepted, key at these frames, rising; None is the scene as it stands, not keyed.
+        solver: a name; None leaves the choice to the plugins. terms: terms, or names of registered ones that are
+        added to the paper's three; the paper's by default. free, held: joints or single dofs by surface that may
+        move, and that may not. prior: what the prior pulls to. pairs: names of those that count; all by default.
+        settings: all that comes before it but the frames, in one value. Nothing is committed:
+        `accept` does that. Where it is cancelled, what was best so far is proposed, with the
+        status CANCELLED. Raises InvalidInput without a pair of a rig that can be posed.
+        """
+        from contact_core.proposals.proposal import SolveSettings, solve, solve_frames
+        from contact_core.scene.problem import Objective
+
+        if settings is None:
+            chosen = None if pairs is None else self._known_pairs(tuple(pairs))
+            objective = Objective(self._terms(terms), limits, free, held, prior, chosen)
+            settings = SolveSettings(solver, options, objective, progress)
+        if frames is None:
+            found = solve(self.document, self._draft(), self.plugins, self.revision, settings)
+        else:
+            drafts = ((float(frame), self._draft(float(frame))) for frame in frames)
+            found = solve_frames(self.document, drafts, len(frames), self.plugins, self.revision, settings)
+        self.show_ghost(found)
+        return found
+
+    def problem(self, objective: Objective | None = None) -> PoseProblem:
+        """The pose problem of the document as the scene has it now: what `solve` gives to a solver."""
+        return self._draft().problem(objective)
+
     def settle(
-        self, *, rounds: int = ROUNDS, reach: float = REACH, settings: ProposalSettings | None = None
+        self, *, rounds: int = ROUNDS, reach: float = REACH, settings: SolveSettings | None = None
     ) -> Proposal:
         """Propose every contact at the closest point of its object that faces it, the pose solved again, in rounds.
 
         Needs a placer called "from pose". reach: contacts farther away than this stay, in manipulator lengths.
         Raises InvalidInput without a pair to settle, and Cancelled.
         """
-        from contact_core.proposals.proposal import ProposalSettings, settle
+        from contact_core.proposals.proposal import SolveSettings, settle
 
-        found = settle(self._draft(), self.plugins, self.revision, settings or ProposalSettings(), rounds, reach)
+        settings = settings or SolveSettings()
+        found = settle(self.document, self._draft(), self.plugins, self.revision, settings, rounds, reach)
         self.show_ghost(found)
         return found
 
@@ -52,32 +122,59 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
         slack: float = SLACK,
         turn: float = TURN,
         penalty: float = PENALTY,
-        settings: ProposalSettings | None = None,
+        settings: SolveSettings | None = None,
     ) -> Proposal:
         """Propose pose and contacts solved together, each contact free within its slack on its surface.
 
         slack: in manipulator lengths. turn: radians, of the headings. penalty: of a slide by the whole slack.
         Raises InvalidInput without a pair that can slide, and Cancelled.
         """
-        from contact_core.proposals.proposal import ProposalSettings, slide
+        from contact_core.proposals.proposal import SolveSettings, slide
 
-        settings = settings or ProposalSettings()
-        found = slide(self._draft(), self.plugins, self.revision, settings, slack, turn, penalty)
+        settings = settings or SolveSettings()
+        found = slide(self.document, self._draft(), self.plugins, self.revision, settings, slack, turn, penalty)
         self.show_ghost(found)
         return found
 
     def accept(self, proposal: Proposal) -> int:
-        """Commit a proposal as one undo step. Raises CommandRejected when the document has changed since."""
+        """Commit a proposal: contacts and poses of the document, poses and keys of the scene, as one undo step.
+
+        Raises CommandRejected when the document has changed since.
+        """
         if proposal.revision != self.revision:
             raise CommandRejected("the document has changed since this was proposed: propose again.")
-        return self.submit(proposal.command)
+        return self.do(proposal.command, keys=proposal.keys)
 
     def dismiss(self, proposal: Proposal) -> None:
         """Take the ghost away; nothing was committed."""
         if proposal.revision == self.revision:
             self.show_ghost(None)
 
-    def _draft(self) -> Draft:
+    def _draft(self, frame: float | None = None) -> Draft:
+        """The document as the scene has it at a frame, to work on."""
         from contact_core.proposals.draft import Draft
 
-        return Draft(self.document, self.derived, self.rigs)
+        document = self.binding.read(self.document, frame)
+        posed = {
+            document.patch(end).surface
+            for pair in document.pairs.values()
+            for end in (pair.manipulator, pair.object)
+        }
+        return Draft(document, self.derived, self.rigs, self.binding.evaluated(sorted(posed)))
+
+    def _terms(self, terms: Iterable[str | PoseTerm] | None) -> tuple[PoseTerm, ...]:
+        """The paper's terms, and those named; terms that are given as values replace the paper's."""
+        from contact_core.plugins.registry import POSE_TERMS
+        from contact_core.solve.terms import paper_terms
+
+        asked = list(terms or ())
+        values = tuple(term for term in asked if not isinstance(term, str))
+        named = tuple(self.plugins.get(POSE_TERMS, term) for term in asked if isinstance(term, str))
+        return (values or paper_terms()) + named
+
+    def _known_pairs(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        from contact_core.document.document import named
+
+        for name in names:
+            named(self.document.pairs, name, "pair")
+        return names

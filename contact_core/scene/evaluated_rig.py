@@ -1,9 +1,8 @@
 """A host's rig for a solve: analytic where that is exact, else evaluated by the host itself, and said in words.
 
-found = body_of(host, "hand")
-problem = PoseProblem(bodies=(found.body, ...), ...)
-pose = found.pose(solution)        # for host.write_pose
-found.notes                        # why the host evaluates, if it does
+found = evaluated_by_host(host, "hand")    # None: the analytic rig is exact
+body = found.body("hand", pose, world)      # for a PoseProblem; `scene.problem` does this for a whole document
+found.notes                                 # why the host evaluates
 """
 
 from __future__ import annotations
@@ -18,9 +17,8 @@ from contact_core.errors import InvalidInput
 from contact_core.rig.chart import Chart
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
 from contact_core.scene.host import RigReading, SceneReading
-from contact_core.solve.black_box import BlackBoxDof, DeformedSkin
+from contact_core.solve.black_box import BlackBoxDof, DeformedSkin, dof_pose
 from contact_core.solve.body import Body
-from contact_core.solve.solver import PoseSolution
 
 TOLERANCE = 1e-4  # of the skin's diagonal: single precision of hosts stays well below
 PROBES = 3  # bent poses that are compared
@@ -50,34 +48,33 @@ class SkinCheck:
 
 
 @dataclass(frozen=True, eq=False)
-class HostBody:
-    """A body, and sentences on why it is the host that evaluates it (none where it is analytic)."""
+class HostRig:
+    """A rig whose skin only the host can evaluate. notes: sentences on why."""
 
-    body: Body
+    host: EvaluatingHost
+    object_id: str
     check: SkinCheck
     notes: tuple[str, ...]
 
-    def pose(self, solution: PoseSolution) -> Pose:
-        """The pose of all joints out of a solution with this body."""
-        solved = solution.poses[self.body.name]
-        return self.body.black_box.pose(solved) if isinstance(self.body.black_box, EvaluatedRig) else solved
+    def body(self, name: str, pose: Pose | None, world_from_rig: FloatArray) -> Body:
+        """The body of a solve that starts in a pose of the joints, by default the one in the scene."""
+        box = EvaluatedRig(self.host, self.object_id, pose, world_from_rig)
+        return Body.evaluated(name, box, pose=box.start)
 
 
-def body_of(host: EvaluatingHost, object_id: str, name: str | None = None) -> HostBody:
-    """The rig of a host as a body where it stands, after one comparison of skins; see `check_skin`."""
-    asset, check = host.read_rig(object_id), check_skin(host, object_id)
-    assert asset.rig is not None  # read_rig fills it
-    name = name or asset.name
+def evaluated_by_host(host: EvaluatingHost, object_id: str) -> HostRig | None:
+    """The rig as the host evaluates it, None where linear blend skinning is exact; compares skins once
+    (`check_skin`)."""
+    check = check_skin(host, object_id)
     if check.is_exact:
-        placed = host.placement(object_id)
-        body = Body.skinned(asset.rig, name=name, pose=host.read_pose(object_id), world_from_rig=placed)
-        return HostBody(body, check, ())
+        return None
+    name = host.read_rig(object_id).name
     note = (
         f"the skin of {name} is not linear blend skinning of its joints: the host puts vertex {check.vertex}"
         f" {check.largest:.3g} away ({100.0 * check.share:.2g} % of the skin's size). The host evaluates it"
         " during the solve, which is slower."
     )
-    return HostBody(Body.evaluated(name, EvaluatedRig(host, object_id)), check, (note,))
+    return HostRig(host, object_id, check, (note,))
 
 
 def check_skin(host: RigReading, object_id: str) -> SkinCheck:
@@ -120,24 +117,43 @@ def skin_in(rig: Rig, pose: Pose) -> FloatArray:
 
 
 class EvaluatedRig(DeformedSkin):
-    """The dofs of the rig that the host reads, unlocked ones only; points in the world from `skin_points`."""
+    """The dofs of the rig that the host reads, unlocked ones only; points in the world from `skin_points`.
 
-    def __init__(self, host: EvaluatingHost, object_id: str) -> None:
+    pose: of the joints, where it starts and where locked dofs stay; by default that of the scene. world_from_rig:
+    (4, 4) where it stands; by default as in the scene.
+    """
+
+    def __init__(
+        self,
+        host: EvaluatingHost,
+        object_id: str,
+        pose: Pose | None = None,
+        world_from_rig: FloatArray | None = None,
+    ) -> None:
         asset = host.read_rig(object_id)
         assert asset.rig is not None  # read_rig fills it
         self.chart = Chart(asset.rig)
         self._free = np.flatnonzero(~self.chart.locked)
-        self._start, self._leftover = self.chart.theta_of(host.read_pose(object_id))
-        place, size = host.placement(object_id), asset.rig.surface.bounding_box_diagonal
+        found = host.read_pose(object_id) if pose is None else pose
+        self._start, self._leftover = self.chart.theta_of(found)
+        place = host.placement(object_id) if world_from_rig is None else world_from_rig
+        size = asset.rig.surface.bounding_box_diagonal
 
         def deform(theta: FloatArray) -> FloatArray:
             points = host.skin_points(object_id, self._pose_at(theta))
             return np.asarray(points @ place[:3, :3].T + place[:3, 3])
 
-        super().__init__(asset.rig.surface, [self._dof(int(q), size) for q in self._free], deform, size)
+        scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
+        dofs = [self._dof(int(q), size) for q in self._free]
+        super().__init__(asset.rig.surface, dofs, deform, size * scale)
+
+    @property
+    def start(self) -> Pose:
+        """Its dofs by name, where it starts."""
+        return dof_pose([dof.name for dof in self.dofs], self._start[self._free])
 
     def pose(self, solved: Pose) -> Pose:
-        """The joints' pose out of what a solver answers for a black box: its dofs by name."""
+        """The joints' pose out of what a solver returns for a black box: its dofs by name."""
         value = dict(zip(solved.joints, solved.local[:, 0, 3].tolist(), strict=True))
         return self._pose_at(np.array([value[dof.name] for dof in self.dofs]))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contact_core.document.document import ContactDocument
@@ -97,6 +98,17 @@ class HostLink:
             return
         found = self.stored_history()
         session.adopt(found if found is not None else History(ContactDocument(), revision))
+
+    def saves(self, path: Path | str | None) -> bool:
+        """Whether the host keeps the document, and writes files of that name."""
+        if self._storage is None:
+            return False
+        return path is None or Path(path).suffix.lower() in self._storage.suffixes
+
+    def save(self, path: Path | str | None) -> None:
+        """Have the host write its file. Raises FileRefused."""
+        assert self._storage is not None  # `saves` said so
+        self._storage.save(None if path is None else Path(path))
 
     def close(self) -> None:
         """Stop listening to the host."""

@@ -95,6 +95,13 @@ class DeformedSkin:
         return evaluate
 
 
+def dof_pose(names: Sequence[str], theta: FloatArray) -> Pose:
+    """The pose of a black box: its dofs (d,) by name, each as a translation along x."""
+    local = np.tile(np.eye(4), (len(theta), 1, 1))
+    local[:, 0, 3] = theta
+    return Pose(tuple(names), local)
+
+
 class BlackBoxMotion:
     """One body at one theta, as `chart.Motion` is for rigs: no bones, but the watched points and normals (k, 3)."""
 
@@ -142,15 +149,13 @@ class BlackBoxChart:
         self.evaluate = black_box.watch(watched)
 
     def theta_of(self, pose: Pose) -> tuple[FloatArray, None]:
-        """theta (d,) of a pose that `pose_of` made; dofs it does not name are 0."""
+        """theta (d,) of a pose that `dof_pose` made; dofs it does not name are 0."""
         values = dict(zip(pose.joints, pose.local[:, 0, 3].tolist(), strict=True))
         return np.array([values.get(name, 0.0) for name in self.dof_names]), None
 
     def local(self, theta: FloatArray, leftover: FloatArray | None = None) -> FloatArray:
         """(d, 4, 4) the dofs as translations along x."""
-        result = np.tile(np.eye(4), (len(theta), 1, 1))
-        result[:, 0, 3] = theta
-        return result
+        return dof_pose(self.dof_names, theta).local
 
     def motion(self, theta: FloatArray, leftover: FloatArray | None = None) -> BlackBoxMotion:
         """The watched points at theta (d,)."""

@@ -56,15 +56,10 @@ class Body:
         return cls(name, rig, Pose.rest(rig), np.eye(4) if world_from_surface is None else world_from_surface)
 
     @classmethod
-    def evaluated(cls, name: str, black_box: BlackBox) -> Body:
-        """A body that something else evaluates, starting at rest."""
-        return cls(
-            name,
-            rigid_rig(name, black_box.surface, movable=False),
-            Pose((), np.zeros((0, 4, 4))),
-            np.eye(4),
-            black_box,
-        )
+    def evaluated(cls, name: str, black_box: BlackBox, *, pose: Pose | None = None) -> Body:
+        """A body that something else evaluates. pose: its dofs by name (`dof_pose`), by default at rest."""
+        start = Pose((), np.zeros((0, 4, 4))) if pose is None else pose
+        return cls(name, rigid_rig(name, black_box.surface, movable=False), start, np.eye(4), black_box)
 
 
 def rigid_rig(name: str, mesh: TriangleMesh, *, movable: bool) -> Rig:

@@ -16,7 +16,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
-from contact_core.proposals.proposal import Proposal, ProposalSettings
+from contact_core.proposals.proposal import Proposal, SolveSettings
 from contact_core.rig.rig import Rig
 from contact_core.scene.memory_host import MemoryHost
 from contact_core.session import DocumentChanged, Session
@@ -171,10 +171,10 @@ def test_refusals(session: Session) -> None:
     host = MemoryHost()
     host.cancel()
     with pytest.raises(Cancelled):
-        session.slide(settings=ProposalSettings(progress=host))
+        session.slide(settings=SolveSettings(progress=host))
     before = session.document
     with pytest.raises(InvalidInput):
-        session.settle(settings=ProposalSettings(solver="none such"))
+        session.settle(settings=SolveSettings(solver="none such"))
     assert session.document is before
 
 

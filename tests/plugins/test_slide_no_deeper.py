@@ -21,8 +21,9 @@ from contact_core.plugins.manager import PluginManager
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.depth_bound import DepthBound, measured
 from contact_core.proposals.draft import Draft
-from contact_core.proposals.proposal import ProposalSettings, slide
+from contact_core.proposals.proposal import SolveSettings, slide
 from contact_core.rig.rig import skin
+from contact_core.scene.problem import Objective
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import Allowance, NoDeeperTerm
@@ -144,7 +145,7 @@ class ThroughWalls:
 
 
 @dataclass(frozen=True, eq=False)
-class Through(ProposalSettings):
+class Through(SolveSettings):
     def solver_of(self, plugins: PluginManager) -> PoseSolver:
         return ThroughWalls()
 
@@ -153,8 +154,8 @@ def test_where_skin_would_be_deeper_nothing_slides_and_it_is_said(repository: Pa
     recipe = load_recipe(repository / "examples" / "07_mug_slide.toml")
     job = perform(replace(recipe, solve=replace(recipe.solve, slide=0.0)), PLUGINS)
     draft = Draft(job.session.document, job.session.derived, job.session.rigs)
-    settings = Through(terms=job.solution.problem.terms, solids={"object": job.solids})
-    proposal = slide(draft, PLUGINS, job.session.revision, settings)
+    settings = Through(objective=Objective(job.solution.problem.terms), solids={"object": job.solids})
+    proposal = slide(draft.document, draft, PLUGINS, job.session.revision, settings)
     assert proposal.command.placements == ()
     assert proposal.after.value == pytest.approx(proposal.before.value, rel=1e-9)
     assert any("stay where they are" in note for note in proposal.after.notes)

@@ -5,7 +5,7 @@
     pose = black_box.pose(solution.poses["hand"])
 
 Every evaluation poses the bones, lets the dependency graph run and takes the pose back: a few milliseconds.
-`contact_core.scene.evaluated_rig.body_of` chooses between this and the analytic rig by comparing skins.
+A session chooses between this and the analytic rig by comparing skins (`scene.evaluated_rig`).
 """
 
 from contact_core.scene.evaluated_rig import EvaluatedRig

@@ -127,17 +127,11 @@ def _inspection_text(facts: dict[str, Any]) -> str:
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    from contact_core.job.assets import read_file
-    from contact_core.plugins.registry import SAMPLES
+    from contact_core.plugins.reading import read_asset
     from contact_core.scene.host import SceneSpace
     from contact_usd.host import UsdHost
 
-    assets = [
-        arguments.plugins.get(SAMPLES, name.removeprefix("sample:")).build()
-        if name.startswith("sample:")
-        else read_file(Path(name), arguments.plugins)
-        for name in arguments.assets
-    ]
+    assets = [read_asset(name, arguments.plugins) for name in arguments.assets]
     unit = next((asset.meters_per_unit for asset in assets if asset.meters_per_unit is not None), 1.0)
     host = UsdHost(space=SceneSpace(unit, assets[0].up_axis))
     paths = [host.add(asset) for asset in assets]
@@ -160,11 +154,14 @@ def _solve(arguments: argparse.Namespace) -> int:
     from contact_core.plugins.registry import POSE_SOLVERS
     from contact_usd import shots
 
-    solver = arguments.plugins.get(POSE_SOLVERS, arguments.solver)
-    wanted = dict(arguments.surface)
-    return _each_shot(
-        arguments, lambda path, out, part: shots.solve(path, arguments.frames, solver, wanted, out, part)
-    )
+    plugins, wanted = arguments.plugins, dict(arguments.surface)
+    solver = arguments.solver
+    plugins.get(POSE_SOLVERS, solver)  # before the first shot, an unknown name is refused
+
+    def work(path: Path, out: Path | None, part: Progress) -> dict[str, object]:
+        return shots.solve(path, arguments.frames, solver, wanted, out, part, plugins)
+
+    return _each_shot(arguments, work)
 
 
 Work = Callable[[Path, Path | None, Progress], dict[str, object]]

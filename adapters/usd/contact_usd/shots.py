@@ -2,111 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import contextlib
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from contact_core.document.asset import Asset
-from contact_core.document.document import ContactDocument, Surface
-from contact_core.edit.pose_problem import pose_problem
-from contact_core.errors import FileRefused, InvalidInput
+from contact_core.document.document import ContactDocument
+from contact_core.errors import Cancelled, FileRefused, InvalidInput
+from contact_core.plugins.manager import PluginManager
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.session import Session
-from contact_core.solve.body import Body
-from contact_core.solve.problem import PoseProblem
-from contact_core.solve.sequence import SequenceSolution, solve_sequence
-from contact_core.solve.solver import PoseSolver
+from contact_core.solve.solver import PoseSolution, SolveStatus
 from contact_usd import contacts
 from contact_usd.host import UsdHost
 from contact_usd.stage_io import SUFFIXES
 
-KEY = "host.usd"  # the document's extras: the prim behind each surface
+
+@contextlib.contextmanager
+def open_shot(
+    path: Path, surfaces: Mapping[str, str] | None = None, plugins: PluginManager | None = None
+) -> Iterator[Session]:
+    """A session on a stage, every surface of its document bound to a prim.
+
+    surfaces: prim paths by surface, for those that cannot be told.
+
+    The stage ends with the block, so that the next shot finds files as they are then. Raises InvalidInput for a
+    surface without a prim.
+    """
+    session = Session(host=UsdHost(path), surfaces=surfaces, plugins=plugins if plugins is not None else ())
+    try:
+        for name, why in session.binding.missing.items():
+            raise InvalidInput(f"{why} Name its prim with --surface {name}=PATH.")
+        yield session
+    finally:
+        session.close()
 
 
-@dataclass
-class Shot:
-    """A stage and a session on the document in it. prims: path of the prim behind each surface of the document."""
+def prims_of(session: Session) -> dict[str, str]:
+    """The path of the prim behind each surface."""
+    return {name: found.object_id for name, found in session.binding.surfaces.items()}
 
-    host: UsdHost
-    session: Session
-    prims: dict[str, str] = field(default_factory=dict)
 
-    @classmethod
-    def open(cls, path: Path, wanted: Mapping[str, str] | None = None) -> Shot:
-        """A file, with all surfaces of its document found in it. wanted: prim paths by surface, told not found.
-
-        As a context manager it lets go of the stage at the end, so that the next shot finds files as they are then.
-        """
-        host = UsdHost(path)
-        shot = cls(host, Session(host=host))
-        try:
-            for surface in shot.session.document.surfaces.values():
-                shot.bind(surface, wanted or {})
-        except BaseException:
-            shot.__exit__()
-            raise
-        return shot
-
-    def __enter__(self) -> Shot:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.session.close()
-        self.session.host = None  # the stage ends now, whenever Python finds time to free the session
-
-    def bind(self, surface: Surface, wanted: Mapping[str, str]) -> None:
-        """Give the session the mesh behind a surface, where it stands now. Raises InvalidInput."""
-        path, asset = self._find(surface, wanted)
-        placement = self.host.placement(path)
-        self.session.add_surface(
-            surface.name,
-            asset.mesh,
-            rig=asset.rig,
-            meters_per_unit=asset.meters_per_unit or 1.0,
-            up_axis=asset.up_axis,
-            world_from_surface=placement,
-        )
-        if np.abs(self.session.document.surface(surface.name).world_from_surface - placement).max() > 1e-9:
-            self.session.place_surface(surface.name, placement)
-        self.prims[surface.name] = path
-
-    def _find(self, surface: Surface, wanted: Mapping[str, str]) -> tuple[str, Asset]:
-        """Path and asset of the prim that is told, or remembered, or alone has the surface's triangles."""
-        remembered = self.session.document.extras.get(KEY, {}).get(surface.name)
-        paths = [item.id for item in self.host.objects()]
-        told = wanted.get(surface.name)
-        if told is not None or remembered in paths:
-            path = str(told or remembered)
-            return path, self.host.read_surface(path)
-        alike = [
-            (path, asset)
-            for path, asset in ((path, self.host.read_surface(path)) for path in paths)
-            if asset.mesh.topology_digest == surface.topology_digest
-        ]
-        if len(alike) == 1:
-            return alike[0]
-        named = [(path, asset) for path, asset in alike if asset.name == surface.name]
-        if len(named) == 1:
-            return named[0]
-        raise InvalidInput(
-            f"{len(alike) or 'no'} prims have the {surface.faces} triangles of the surface {surface.name!r}:"
-            f" name one with --surface {surface.name}=PATH; there are {', '.join(paths[:8]) or 'no meshes at all'}."
-        )
-
-    def publish(self) -> None:
-        """Remember which prim is which, and write what viewers see."""
-        if dict(self.session.document.extras.get(KEY, {})) != self.prims:
-            self.session.set_extra(KEY, dict(self.prims))
-        contacts.publish(self.host, self.session, self.prims)
+def publish(session: Session) -> None:
+    """Remember which prim is which, and write what viewers see."""
+    prims = prims_of(session)
+    key = session.binding.key
+    if dict(session.document.extras.get(key, {})) != prims:
+        session.set_extra(key, dict(prims))
+    contacts.publish(session.host, session, prims)
 
 
 def read_contacts(path: Path) -> ContactDocument:
     """The document in a stage or in a document file. Raises FileRefused where there is none, or it is empty."""
     if path.suffix.lower() in SUFFIXES:
-        with Shot(host := UsdHost(path), Session(host=host, discover=False)) as shot:
-            document = shot.session.document
+        with Session(host=UsdHost(path), discover=False) as session:
+            document = session.document
     elif path.is_file():
         with Session.open(path) as session:  # with what an interrupted journal holds, which stays there unsaved
             document = session.document
@@ -126,73 +78,50 @@ def transfer(
     """
     with Session(document, discover=False) as source:
         loaded = source.contact_set("contacts", list(document.patches))
-    with Shot.open(path, wanted) as shot:
+    with open_shot(path, wanted) as shot:
         with shot.host.step("Transfer contacts"):
             for surface in loaded.surfaces.values():
-                if surface.name not in shot.prims:
-                    shot.bind(surface, wanted)
-            names = shot.session.import_set(loaded)
-            shot.publish()
+                if surface.name not in shot.document.surfaces:
+                    shot.bring(surface, wanted.get(surface.name))
+            names = shot.import_set(loaded)
+            publish(shot)
         shot.host.save(out)
-        return {"patches": list(names.values()), "surfaces": shot.prims}
+        return {"patches": list(names.values()), "surfaces": prims_of(shot)}
 
 
 def solve(
     path: Path,
     frames: Sequence[float] | None,
-    solver: PoseSolver,
+    solver: str | None,
     wanted: Mapping[str, str],
     out: Path | None,
     progress: Progress = NO_PROGRESS,
+    plugins: PluginManager | None = None,
 ) -> dict[str, object]:
     """Solve the pairs of a shot at frames, key the rigs there and save it; facts for the report.
 
     frames: None for one solve without a key. Each frame starts from the animator's pose, later ones from the last.
+    solver: a name; None leaves the choice to the plugins.
     """
-    with Shot.open(path, wanted) as shot:
-        if not shot.session.document.pairs:
+    with open_shot(path, wanted, plugins) as shot:
+        if not shot.document.pairs:
             raise InvalidInput(f"{path} has no contact pairs, so there is nothing to solve.")
-        times: list[float | None] = list(frames) if frames is not None else [None]
-        problems = ((0.0 if frame is None else frame, _problem(shot, frame)) for frame in times)
-        solved = solve_sequence(solver, problems, progress=progress, count=len(times))
-        if solved.solutions:  # else it was cancelled before the first
-            _write(shot, times, solved)
+        times: Sequence[float | None] = [None] if frames is None else frames
+        try:
+            proposal = shot.solve(frames=frames, solver=solver, progress=progress)
+        except Cancelled:  # before the first frame
+            return {"frames": [_frame_facts(frame, None) for frame in times]}
+        if proposal.after.status is not SolveStatus.CANCELLED:
+            with shot.host.step("Solve and key"):
+                shot.accept(proposal)
+                publish(shot)
             shot.host.save(out)
-        return {"frames": [_frame_facts(frame, k, solved) for k, frame in enumerate(times)]}
+        return {"frames": [_frame_facts(*known) for known in itertools.zip_longest(times, proposal.solutions)]}
 
 
-def _write(shot: Shot, times: Sequence[float | None], solved: SequenceSolution) -> None:
-    """Key what was solved, keep the last pose in the document, and show it: one step."""
-    rigs = [name for name in shot.prims if name in shot.session.rigs]
-    with shot.host.step("Solve and key"):
-        for frame, solution in zip(times, solved.solutions, strict=False):
-            for name in rigs:
-                if name in solution.poses:
-                    shot.host.write_pose(shot.prims[name], solution.poses[name], frame)
-        for name in rigs:
-            if name in solved.solutions[-1].poses:
-                shot.session.set_pose(name, solved.solutions[-1].poses[name])
-        shot.publish()
-
-
-def _problem(shot: Shot, frame: float | None) -> PoseProblem:
-    """The document's pairs, with everything where the stage has it at a frame."""
-
-    def body_of(name: str) -> Body:
-        placement = shot.host.placement(shot.prims[name], frame)
-        rig = shot.session.rigs.get(name)
-        if rig is None:
-            return Body.rigid(name, shot.session.meshes[name], world_from_surface=placement)
-        pose = shot.host.read_pose(shot.prims[name], frame)
-        return Body.skinned(rig, name=name, pose=pose, world_from_rig=placement)
-
-    return pose_problem(shot.session.pairs(), body_of)
-
-
-def _frame_facts(frame: float | None, k: int, solved: SequenceSolution) -> dict[str, object]:
-    if k >= len(solved.solutions):
+def _frame_facts(frame: float | None, solution: PoseSolution | None) -> dict[str, object]:
+    if solution is None:
         return {"frame": frame, "status": "CANCELLED"}
-    solution = solved.solutions[k]
     return {
         "frame": frame,
         "status": solution.status.name,

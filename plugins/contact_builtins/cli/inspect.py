@@ -17,9 +17,9 @@ class Inspect:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_builtins.formats.inspection import inspect_asset
-        from contact_core.job.assets import read_file
+        from contact_core.plugins.reading import read_asset
 
-        asset = read_file(arguments.file, arguments.plugins, sidecar=arguments.sidecar)
+        asset = read_asset(arguments.file, arguments.plugins, sidecar=arguments.sidecar)
         facts = {"file": str(arguments.file), **inspect_asset(asset)}
         arguments.output.answer(facts, _text(facts))
         return 0

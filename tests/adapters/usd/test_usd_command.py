@@ -26,7 +26,7 @@ from contact_core.testing.host_checks import pose_error
 from contact_core.testing.host_scenes import arm_rig
 from contact_usd import contacts
 from contact_usd.host import UsdHost
-from contact_usd.shots import Shot
+from contact_usd.shots import open_shot
 
 ARM, BALL = "/arm_rig/arm", "/ball"
 
@@ -102,8 +102,8 @@ def test_contacts_go_to_every_shot_and_every_frame_is_solved(
     for path in work:
         host = UsdHost(path)
         assert host.pose_keys(ARM) == (1.0, 2.0, 3.0)
-        shot = Shot.open(path)
-        (pair,) = shot.session.pairs()
+        with open_shot(path) as shot:
+            (pair,) = shot.pairs()
         for frame in (1.0, 2.0, 3.0):
             pose = host.read_pose(ARM, frame)
             poses.append(pose)
