@@ -13,6 +13,7 @@ from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput
 
 RELATIVE_TOLERANCE = 1e-6  # of the bounding box diagonal: above float32 rounding, far below any real edge
+_STEP, _LEVELS = 8.0, 8
 
 
 def weld(points: Any, tolerance: float | None = None) -> tuple[FloatArray, IntArray]:
@@ -33,6 +34,40 @@ def weld(points: Any, tolerance: float | None = None) -> tuple[FloatArray, IntAr
     if tolerance > 0.0 and len(first) > 1:
         first, group = _join_close(positions, first, group, tolerance)
     return positions[first], group
+
+
+def close_points(points: FloatArray, reach: FloatArray) -> IntArray:
+    """(n,) group of each point: two points join within the smaller reach of both, equal ones always, and
+    chains of such.
+
+    points: (n, 3). reach: (n,) surface units. Groups are numbered by first appearance.
+    """
+    if _all_apart(points) and not reach.any():
+        return np.arange(len(points))
+    first, group = _equal_rows(points)
+    shortest = np.full(len(first), np.inf)
+    np.minimum.at(shortest, group, reach)
+    pairs = _pairs_within(points[first], shortest)
+    if not len(pairs):
+        return group
+    return _joined(len(points), first, group, pairs)[1]
+
+
+def _pairs_within(points: FloatArray, reach: FloatArray) -> IntArray:
+    """(p, 2) rows within the smaller reach of both. Rows of like reach are searched together, so that a large reach
+    far away costs nothing where points are dense."""
+    from scipy.spatial import cKDTree
+
+    largest = float(reach.max(initial=0.0))
+    found = [np.zeros((0, 2), np.int64)]
+    for level in range(_LEVELS):
+        until = largest / _STEP**level
+        rows = np.flatnonzero(reach > until / _STEP) if until > 0.0 else np.zeros(0, np.int64)
+        if len(rows) > 1:
+            pairs = rows[cKDTree(points[rows]).query_pairs(until, output_type="ndarray")]
+            gap = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+            found.append(pairs[gap <= reach[pairs].min(axis=1)])
+    return np.concatenate(found)
 
 
 def _all_apart(positions: FloatArray) -> bool:
@@ -59,16 +94,20 @@ def _join_close(
     positions: FloatArray, first: IntArray, group: IntArray, tolerance: float
 ) -> tuple[IntArray, IntArray]:
     """The same, after joining groups whose positions are within tolerance of one another."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(positions[first]).query_pairs(tolerance, output_type="ndarray")  # (p, 2)
-    if not len(pairs):
-        return first, group
+    return _joined(len(positions), first, group, pairs) if len(pairs) else (first, group)
+
+
+def _joined(total: int, first: IntArray, group: IntArray, pairs: IntArray) -> tuple[IntArray, IntArray]:
+    """First rows and groups after the groups of each of the pairs (p, 2) became one."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     count, label = connected_components(graph, directed=False)
-    earliest = np.full(count, len(positions), np.int64)
+    earliest = np.full(count, total, np.int64)
     np.minimum.at(earliest, label, first)
     return _by_first_appearance(earliest, label[group].astype(np.int64))
 

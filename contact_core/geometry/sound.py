@@ -1,0 +1,278 @@
+"""Polygons of a file as one sound surface: joined at seams, doubles dropped, wound outwards.
+
+Files split points along texture seams, write loose triangles, list faces twice or wind them inwards. One function
+mends that for every reader and host, and says what it did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from contact_core.arrays import BoolArray, FloatArray, IntArray
+from contact_core.geometry.stitch import (
+    Sides,
+    joined_points,
+    open_sides,
+    pairs_of_open_sides,
+    without,
+    without_crowds,
+)
+from contact_core.geometry.weld import close_points
+from contact_core.geometry.winding import Winding, facing_inwards, wound_alike
+
+ROUNDING = (
+    8 * 2.0**-23
+)  # relative: copies of a point that went through float32 differ by a few units in the last place
+SHARE_OF_EDGE = 0.1  # of the shortest edge at a point: what lies farther is another point
+
+
+@dataclass(frozen=True, eq=False)
+class SoundPolygons:
+    """point_of: (n,) new point of each old one, numbered by first appearance. first: (k,) the old point behind
+    each. sizes: (g,) and indices: the polygons that remain, of new points. face_of: (g,) which ones they were."""
+
+    point_of: IntArray
+    first: IntArray
+    sizes: IntArray
+    indices: IntArray
+    face_of: IntArray
+    notes: tuple[str, ...]
+
+
+def sound_polygons(
+    points: FloatArray,
+    sizes: IntArray,
+    indices: IntArray,
+    *,
+    apart: IntArray | None = None,
+    exact: bool = False,
+    clockwise: bool = False,
+) -> SoundPolygons:
+    """Join, drop doubles, turn. points: (n, 3) finite. sizes: (f,) corners per polygon. indices: their points.
+
+    apart: (n,) labels; points of different labels never become one. exact: only bit-equal positions are joined.
+    clockwise: polygons are wound so seen from outside. What is manifold stays so (`stitch`).
+    """
+    notes: list[str] = []
+    sides = Sides.of(sizes, indices)
+    reach = np.zeros(len(points)) if exact else _reach(points, sides)
+    group = _groups(points, sides, reach, apart)
+    kept = _single_faces(group, sizes, indices, notes)
+    if not kept.all():
+        sides = Sides.of(sizes[kept], indices[np.repeat(kept, sizes)])
+    pairs, label = _joined(points, sides, group, either_sense=True)
+    if not exact:
+        pairs, label, group = _joined_across_noise(points, sides, apart, (pairs, label, group), notes)
+    winding, label = _wound(sides, int(kept.sum()), group, pairs, label)
+    first = np.unique(label, return_index=True)[1]
+    turned = _turned_outwards(points[first], sides.between(label), winding, clockwise, notes)
+    return SoundPolygons(
+        point_of=label,
+        first=first,
+        sizes=sizes[kept],
+        indices=label[_reversed_where(turned, sides)],
+        face_of=np.flatnonzero(kept),
+        notes=(*_joining_notes(len(points), len(first)), *notes, *_loose_notes(sides.between(label), winding)),
+    )
+
+
+def _reach(points: FloatArray, sides: Sides) -> FloatArray:
+    """(n,) how far the copies of a point may lie apart (surface units): a few roundings of float32 at the size of
+    the coordinates, and never a noticeable part of the shortest edge at the point."""
+    size = np.abs(points).max(axis=1, initial=0.0)
+    typical = float(np.median(size)) if len(size) else 0.0
+    rounding = ROUNDING * np.maximum(size, typical)
+    return np.asarray(np.minimum(rounding, SHARE_OF_EDGE * _shortest_edges(points, sides)))
+
+
+def _shortest_edges(points: FloatArray, sides: Sides) -> FloatArray:
+    """(n,) length of the shortest edge of some length at each point; inf where there is none."""
+    length = np.linalg.norm(points[sides.tail] - points[sides.head], axis=1)
+    shortest = np.full(len(points), np.inf)
+    long = length > 0.0
+    for ends in (sides.tail, sides.head):
+        np.minimum.at(shortest, ends[long], length[long])
+    return shortest
+
+
+def _groups(points: FloatArray, sides: Sides, reach: FloatArray, apart: IntArray | None) -> IntArray:
+    """(n,) group of each point that lies at one place: equal positions, on open sides also close ones."""
+    on_border = np.zeros(len(points), bool)
+    loose = open_sides(sides)
+    on_border[sides.tail[loose]] = on_border[sides.head[loose]] = True
+    group = close_points(points, np.where(on_border, np.where(np.isfinite(reach), reach, 0.0), 0.0))
+    shrunk = (group[sides.tail] == group[sides.head]) & (points[sides.tail] != points[sides.head]).any(axis=1)
+    if shrunk.any():  # chains of close points swallowed an edge: only equal positions join there
+        equal = close_points(points, np.zeros(len(points)))
+        lost = np.isin(group, group[sides.tail[shrunk]])
+        group = np.where(lost, equal + len(points), group)
+    if apart is not None:
+        group = np.unique(np.stack([group, apart]), axis=1, return_inverse=True)[1].reshape(-1)
+    return np.unique(group, return_inverse=True)[1].reshape(-1)
+
+
+def _single_faces(group: IntArray, sizes: IntArray, indices: IntArray, notes: list[str]) -> BoolArray:
+    """(f,) which faces have three corners or more in different places, and are the first to lie there."""
+    face, place = np.repeat(np.arange(len(sizes)), sizes), group[indices]
+    order = np.lexsort((place, face))
+    fresh = np.ones(len(order), bool)
+    fresh[1:] = (np.diff(face[order]) != 0) | (np.diff(place[order]) != 0)
+    corners = np.bincount(face[order[fresh]], minlength=len(sizes))
+    kept = corners >= 3
+    if not kept.all():
+        notes.append(f"{np.count_nonzero(~kept)} faces with fewer than 3 different corners were dropped.")
+    # faces of the same corners have the same sum of scrambled corners; those few are compared in full
+    mixed = (place.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xC2B2AE3D27D4EB4F)
+    sums = np.concatenate([np.zeros(1, np.uint64), np.cumsum(mixed, dtype=np.uint64)])
+    ends = np.cumsum(sizes)
+    _, alike, uses = np.unique(sums[ends] - sums[ends - sizes], return_inverse=True, return_counts=True)
+    suspects = np.flatnonzero(kept & (uses[alike.reshape(-1)] > 1))
+    doubles = _doubles(suspects, group, sizes, indices) if len(suspects) else []
+    if doubles:
+        kept[doubles] = False
+        notes.append(f"{len(doubles)} faces lay on another face with the same corners and were dropped.")
+    return kept
+
+
+def _doubles(suspects: IntArray, group: IntArray, sizes: IntArray, indices: IntArray) -> list[int]:
+    """Faces on another one: of the same points, or of a part that the file does not connect with the other's."""
+    starts = np.cumsum(sizes) - sizes
+    first = indices[np.minimum(np.repeat(starts, sizes), len(indices) - 1)]
+    count = len(group)
+    graph = coo_array((np.ones(len(indices), np.int8), (indices, first)), shape=(count, count))
+    _, part = connected_components(graph, directed=False)
+    seen: dict[tuple[int, ...], list[IntArray]] = {}
+    doubles = list[int]()
+    for face in suspects.tolist():
+        corners = np.sort(indices[starts[face] : starts[face] + sizes[face]])
+        others = seen.setdefault(tuple(sorted(group[corners].tolist())), [])
+        if any(part[o[0]] != part[corners[0]] or np.array_equal(o, corners) for o in others):
+            doubles.append(face)
+        else:
+            others.append(corners)
+    return doubles
+
+
+def _joined(points: FloatArray, sides: Sides, group: IntArray, *, either_sense: bool) -> tuple[IntArray, IntArray]:
+    """Pairs of sides that were joined (p, 2), and the label of each point (n,)."""
+    loose = open_sides(sides)
+    if not len(loose):
+        return np.zeros((0, 2), np.int64), np.arange(len(points))
+    pairs = pairs_of_open_sides(points, sides, loose, group, either_sense=either_sense)
+    return without_crowds(len(points), sides, group, pairs)
+
+
+def _joined_across_noise(
+    points: FloatArray,
+    sides: Sides,
+    apart: IntArray | None,
+    so_far: tuple[IntArray, IntArray, IntArray],
+    notes: list[str],
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Pairs, labels and groups after joining open sides that nearly meet, where that closes most of what is open.
+
+    Then the gaps are noise of whatever wrote the file, and no part of the shape.
+    """
+    label = so_far[1]
+    met = sides.between(label)
+    still = open_sides(met)
+    if not len(still):
+        return so_far
+    border = np.unique(np.concatenate([sides.tail[still], sides.head[still]]))
+    reach = SHARE_OF_EDGE * _shortest_edges(points, sides)
+    gap = _gaps(points[border], label[border])
+    near = gap <= reach[border]
+    if np.count_nonzero(near) < _MOST * len(border):
+        return so_far
+    widest = float(gap[near].max())
+    wider = _groups(
+        points, sides, np.minimum(reach, 2.0 * widest), apart
+    )  # twice: copies of one point all round it
+    new_pairs, new_label = _joined(points, sides, wider, either_sense=False)
+    left = len(open_sides(sides.between(new_label)))
+    if left > (1.0 - _MOST) * len(still):
+        return so_far
+    notes.append(
+        f"{len(still) - left} of {len(still)} open edges met another one up to {widest:.3g} away and were joined"
+        " with it: the copies of their points differ by more than rounding."
+    )
+    return new_pairs, new_label, wider
+
+
+_MOST = 0.75
+
+
+def _gaps(places: FloatArray, label: IntArray) -> FloatArray:
+    """(b,) distance from each place to the nearest one of another label."""
+    from scipy.spatial import cKDTree
+
+    _, one = np.unique(label, return_index=True)
+    if len(one) < 2:
+        return np.full(len(places), np.inf)
+    distance, _ = cKDTree(places[one]).query(places[one], k=2)
+    return np.asarray(distance[np.unique(label, return_inverse=True)[1].reshape(-1), 1])
+
+
+def _wound(sides: Sides, faces: int, group: IntArray, pairs: IntArray, label: IntArray) -> tuple[Winding, IntArray]:
+    """The winding, and the labels: a one-sided surface is left open where it was joined, not against itself."""
+    own, _ = sides.edges
+    while True:
+        met = sides.between(label)
+        winding = wound_alike(met, faces, own)
+        edge, count = met.edges
+        several = np.zeros(len(count), bool)
+        one = np.full(len(count), -1)
+        one[edge] = own
+        several[edge[one[edge] != own]] = True
+        wrong = several & (np.bincount(edge, winding.against, len(count)) > 0)
+        if not wrong.any() or not len(pairs):
+            return winding, label
+        pairs = without(pairs, met, edge, wrong)
+        label = joined_points(len(label), sides, group, pairs)
+
+
+def _turned_outwards(
+    points: FloatArray, sides: Sides, winding: Winding, clockwise: bool, notes: list[str]
+) -> BoolArray:
+    """(f,) faces to turn round, in all."""
+    turned, wound = winding.turned, sides
+    if turned.any():
+        back = turned[sides.face]
+        wound = Sides(sides.face, np.where(back, sides.head, sides.tail), np.where(back, sides.tail, sides.head))
+    inwards = facing_inwards(points, wound, winding.piece, clockwise=clockwise)
+    both = turned ^ inwards[winding.piece]
+    if both.any():
+        outwards = " and closed surfaces face outwards" if inwards.any() else ""
+        notes.append(
+            f"{np.count_nonzero(both)} of {len(both)} faces were turned round, so that neighbours agree{outwards}."
+        )
+    return both
+
+
+def _reversed_where(turned: BoolArray, sides: Sides) -> IntArray:
+    """The corners of all faces, those of turned ones in the other direction."""
+    where = np.arange(len(sides.face))
+    starts = np.searchsorted(sides.face, np.arange(len(turned)))
+    ends = np.append(starts[1:], len(where))
+    backwards = (starts + ends - 1)[sides.face] - where
+    return sides.tail[np.where(turned[sides.face], backwards, where)]
+
+
+def _joining_notes(before: int, after: int) -> list[str]:
+    return [f"{before} vertices lie at {after} positions; they were welded."] if after < before else []
+
+
+def _loose_notes(sides: Sides, winding: Winding) -> list[str]:
+    """A word on what stays a heap of loose faces."""
+    pieces, faces = int(winding.piece.max(initial=-1)) + 1, len(winding.piece)
+    if pieces < 100 or pieces < faces / 4:
+        return []
+    return [
+        f"Its {faces} faces fall into {pieces} pieces whose edges do not meet, and a brush stays on one piece."
+        " Merge vertices by distance in a modelling program, and export again."
+    ]
