@@ -17,6 +17,7 @@ from contact_core.contact.brush import BrushGesture
 from contact_core.errors import InvalidInput
 from contact_core.geometry import SurfacePoints, TriangleMesh, log_map
 from contact_core.geometry.raycast import Locator
+from contact_core.geometry.thinning import first_of_each
 
 _DARTS = 14.0  # candidates per square of the spacing; fewer leave gaps
 _MOST = 400_000  # candidates: beyond them the spacing is not meant
@@ -63,7 +64,7 @@ def stroke_line(gesture: BrushGesture, step: float, *, closed: bool = False) -> 
             steps = np.arange(1, count)[:, None] / count
             parts.append(Locator.of(gesture.mesh).closest(start + steps * (end - start)).points)
     line = SurfacePoints.concatenate(parts)
-    return line[_first_of_each(line.positions(gesture.mesh), 1e-9 * gesture.mesh.bounding_box_diagonal)]
+    return line[first_of_each(line.positions(gesture.mesh), 1e-9 * gesture.mesh.bounding_box_diagonal)]
 
 
 def near_pieces(mesh: TriangleMesh, line: SurfacePoints, reach: float, size: float) -> Pieces:
@@ -105,7 +106,7 @@ def darts(mesh: TriangleMesh, pieces: Pieces, spacing: float, seed: int) -> Surf
 
 def thinned(mesh: TriangleMesh, points: SurfacePoints, spacing: float) -> IntArray:
     """Indices of points that stay when each, in order, keeps all later ones at `spacing`."""
-    return _first_of_each(points.positions(mesh), spacing)
+    return first_of_each(points.positions(mesh), spacing)
 
 
 def spread(
@@ -127,14 +128,3 @@ def _quartered(pieces: Pieces) -> Pieces:
     ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
     corners = np.stack([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]])  # (4, 3, p, 3)
     return Pieces(np.tile(pieces.faces, 4), corners.transpose(0, 2, 1, 3).reshape(-1, 3, 3))
-
-
-def _first_of_each(at: FloatArray, apart: float) -> IntArray:
-    """Indices of points (n, 3), in order, that are farther than `apart` from every earlier one that stayed."""
-    alive = np.ones(len(at), bool)
-    if len(at):
-        for k, neighbours in enumerate(cKDTree(at).query_ball_point(at, apart)):
-            if alive[k]:
-                alive[neighbours] = False
-                alive[k] = True
-    return np.flatnonzero(alive)
