@@ -11,6 +11,8 @@ from pathlib import Path
 
 from contact_core.errors import FileRefused
 
+_STAGING = ".contact-staging-"
+
 
 @contextlib.contextmanager
 def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
@@ -18,14 +20,17 @@ def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
 
     names: of all files of the set. The old ones stay as they are until the last of the new is on the disk; one
     that the new set lacks (a picture that nothing could draw) is gone afterwards. Whoever publishes at the same
-    moment waits, so that two sets never mix; only a process killed between two renames leaves some of each. Raises
-    FileRefused.
+    moment waits, so that two sets never mix; only a process killed between two renames leaves some of each. The
+    staging folder of a killed process is removed by the next. Raises FileRefused.
     """
     check_writable(folder, names)
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        stage = Path(tempfile.mkdtemp(prefix=".contact-", dir=folder))
+        with _exclusive(folder):
+            _remove_leftovers(folder)
+            stage = Path(tempfile.mkdtemp(prefix=_STAGING, dir=folder))
+            in_use = _lock(stage, wait=False)
     except OSError as error:
         raise FileRefused(f"cannot write into {folder}: {error.strerror or error}.") from error
     untouched = True
@@ -47,6 +52,8 @@ def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
         raise FileRefused(f"cannot write into {folder}: {error.strerror or error}. {state}") from error
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+        if in_use is not None:
+            os.close(in_use)
         with contextlib.suppress(OSError):  # what was made for nothing goes; a folder that holds anything stays
             for place in made:
                 place.rmdir()
@@ -64,18 +71,40 @@ def check_writable(folder: Path, names: Collection[str]) -> None:
             raise FileRefused(f"cannot write {folder / name}: it is a folder. Name another folder, or remove it.")
 
 
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the staging folders of processes that were killed; one that is in use is locked by its process."""
+    for stage in folder.glob(_STAGING + "*"):
+        lock = _lock(stage, wait=False)
+        if lock is not None:
+            shutil.rmtree(stage, ignore_errors=True)
+            os.close(lock)
+
+
 @contextlib.contextmanager
 def _exclusive(folder: Path) -> Iterator[None]:
     """While this holds, nobody else is in here with the same folder, where the system can lock folders (POSIX)."""
+    lock = _lock(folder, wait=True)
     try:
-        import fcntl
-    except ImportError:  # Windows: each file is still whole
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        with contextlib.suppress(OSError):  # some network drives know no locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
+        if lock is not None:
+            os.close(lock)
+
+
+def _lock(folder: Path, *, wait: bool) -> int | None:
+    """The descriptor that holds the lock of a folder until it is closed, or its process dies.
+
+    None where another process has it, and where folders cannot be locked: on Windows (each file is still replaced
+    atomically) and on some network drives.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
         os.close(handle)
+        return None
+    return handle

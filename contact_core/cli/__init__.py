@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from contact_core._version import __version__
 from contact_core.cli.output import Output
 from contact_core.errors import ContactError
+from contact_core.interrupts import sigterm_as_interrupt
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.record import spell
 from contact_core.plugins.registry import CLI, resolve
@@ -40,8 +41,18 @@ def main(argv: Sequence[str] | None = None, *, plugins: PluginManager | None = N
     """Run `contact` with arguments (default: those of the process); returns the exit code.
 
     0: done. 1: done, and the answer is no (a check that failed). 2: a ContactError, told in one sentence on stderr.
-    130: interrupted. 141: whoever read the answer closed the pipe, as `head` does.
+    130: interrupted. 143: terminated. 141: whoever read the answer closed the pipe, as `head` does.
     """
+    with sigterm_as_interrupt() as terminated:
+        try:
+            return _guarded(argv, plugins)
+        except KeyboardInterrupt:
+            Output.error("terminated." if terminated() else "interrupted.")
+            return 143 if terminated() else 130
+
+
+def _guarded(argv: Sequence[str] | None, plugins: PluginManager | None) -> int:
+    """`_run`, with what goes wrong as a sentence and an exit code."""
     try:
         return _run(argv, plugins)
     except ContactError as error:
@@ -54,9 +65,6 @@ def main(argv: Sequence[str] | None = None, *, plugins: PluginManager | None = N
         Output.error(f"{error.filename or 'the system'}: {error.strerror or error}.")
     except MemoryError:
         Output.error("the memory of this machine does not suffice; try a smaller mesh or picture.")
-    except KeyboardInterrupt:
-        Output.error("interrupted.")
-        return 130
     return 2
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from contact_core.errors import MissingExtra
+from contact_core.interrupts import noticing_interrupts
 from contact_core.plugins.discovery import Origin
 
 
@@ -47,16 +49,28 @@ class PluginRecord:
         """Whatever a plugin raises inside is written down after `what`, and the program goes on.
 
         Whatever: a module may end in SystemExit, or in pytest's Skipped, which is no Exception either. Only Ctrl+C
-        is the user's and goes through. A missing optional library is told after `missing`, and is no problem.
+        is the user's and goes through. A missing optional library is told after `missing`, and is no problem. A
+        recursion limit that was lowered is restored: the program needs its own.
         """
-        try:
-            yield
-        except KeyboardInterrupt:
-            raise
-        except MissingExtra as error:
-            self.absent.append(f"{missing}{error}")
-        except BaseException as error:
-            self.complain(f"{what} {spell(error)}.")
+        limit = sys.getrecursionlimit()
+        with noticing_interrupts() as by_user:
+            try:
+                try:
+                    yield
+                finally:  # first of all: what follows makes calls
+                    lowered = sys.getrecursionlimit() < limit
+                    if lowered:
+                        sys.setrecursionlimit(limit)
+            except KeyboardInterrupt as error:
+                if by_user():
+                    raise
+                self.complain(f"{what} {spell(error)}.")
+            except MissingExtra as error:
+                self.absent.append(f"{missing}{error}")
+            except BaseException as error:
+                self.complain(f"{what} {spell(error)}.")
+        if lowered:
+            self.complain("it lowered the recursion limit of Python, which is restored.")
 
 
 def spell(error: BaseException) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -179,16 +180,52 @@ def test_an_entry_point_that_cannot_be_parsed_is_named(install: Any, tmp_path: P
     assert record.source == "garbled 2.1" and "entry_points.txt cannot be read" in record.problems[0]
 
 
+HOOK = "from contact_core.plugins import hookimpl\n@hookimpl\n"
+
+
+def offering(hook: Callable[[], Any]) -> ModuleType:
+    module = ModuleType("busy")
+    module.contact_placers = hookimpl(hook)  # type: ignore[attr-defined]
+    return module
+
+
 def test_only_the_user_interrupts() -> None:
     """Ctrl+C while a plugin is at work ends the program, as everywhere."""
-
-    def contact_placers() -> Any:
-        raise KeyboardInterrupt
-
-    module = ModuleType("busy")
-    module.contact_placers = hookimpl(contact_placers)  # type: ignore[attr-defined]
+    handler = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        PluginManager([module], discover=False)
+        PluginManager([offering(lambda: signal.raise_signal(signal.SIGINT))], discover=False)
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+@pytest.mark.parametrize("place", ["import", "hook"])
+def test_a_plugin_that_raises_keyboard_interrupt_is_not_the_user(install: Any, place: str) -> None:
+    hook = HOOK + "def contact_placers(): raise KeyboardInterrupt\n"
+    install(f"impostor_{place}", "raise KeyboardInterrupt" if place == "import" else hook)
+    plugins = PluginManager(environ={})
+    plugins.fill_all()
+    assert any("KeyboardInterrupt" in problem for problem in record_of(plugins, f"impostor_{place}").problems)
+
+
+@pytest.mark.parametrize("place", ["import", "hook"])
+def test_a_lowered_recursion_limit_is_restored_and_told(install: Any, place: str) -> None:
+    """As low as Python allows where the plugin stands."""
+    lower = (
+        "import sys\n"
+        "def lower():\n"
+        "    for limit in range(5, 1000):\n"
+        "        try: return sys.setrecursionlimit(limit)\n"
+        "        except RecursionError: pass\n"
+    )
+    hook = HOOK + "def contact_placers(): lower(); return []\n"
+    install(f"deep_{place}", lower + ("lower()\n" if place == "import" else hook))
+    limit = sys.getrecursionlimit()
+    try:
+        plugins = PluginManager(environ={})
+        plugins.fill_all()
+        assert sys.getrecursionlimit() == limit
+    finally:
+        sys.setrecursionlimit(limit)
+    assert any("lowered the recursion limit" in problem for problem in record_of(plugins, f"deep_{place}").problems)
 
 
 def test_a_name_to_replace_that_nobody_has_is_a_problem(install: Any) -> None:

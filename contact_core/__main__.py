@@ -1,0 +1,29 @@
+"""The program `contact` from its first line on: Ctrl+C during the imports ends it without a traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+
+
+def main() -> int:
+    """Run `contact` with the arguments of the process; returns the exit code."""
+    previous = signal.signal(signal.SIGINT, _leave)  # SIG_IGN where a shell script runs it in the background
+    if previous is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, previous)
+    from contact_core.cli import main as run
+
+    signal.signal(signal.SIGINT, previous)
+    return run()
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """End at once: nothing has begun that would need an orderly end, and libraries are half imported."""
+    os.write(2, b"contact: interrupted.\n")
+    os._exit(130)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
