@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from statistics import median
 from typing import Any
@@ -30,7 +30,7 @@ from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import Iteration, SolveOptions
 from contact_core.solve.threads import one_blas_thread
-from contact_core.testing import rigs
+from contact_core.testing import meshes, rigs
 
 
 def milliseconds(work: Callable[[], object], repeats: int) -> float:
@@ -107,6 +107,28 @@ def nudged(problem: PoseProblem, seed: int) -> PoseProblem:
     moved = Body.rigid("moved", problem.bodies[1].rig.surface, world_from_surface=shift)
     contacts = tuple(replace(c, object="moved") if c is contact else c for c in problem.contacts)
     return replace(problem, bodies=(*problem.bodies, moved), contacts=contacts)
+
+
+def live(depths: Sequence[int], repeats: int) -> dict[int, tuple[float, float]]:
+    """What a drag makes anew at each move, by faces of the object: bodies, tracks and terms from a document's
+    parts (the first time, then the median, processor ms). `problem.at` keeps the tracks, so it hides this cost."""
+    rig, random = rigs.hand_like(rigs.limited_freedom), np.random.default_rng(0)
+    figures = {}
+    for depth in depths:
+        ball = meshes.icosphere(depth)
+        ends = [
+            SurfacePoints(random.integers(faces, size=500), random.dirichlet(np.ones(3), 500))
+            for faces in (len(rig.faces), len(ball.faces))
+        ]
+        times = []
+        for _ in range(repeats + 1):
+            began = time.process_time()
+            contact = PairedPoints("all", rig.name, ends[0], "ball", ends[1])
+            made = PoseProblem((Body.skinned(rig), Body.rigid("ball", ball)), (contact,))
+            made.value(made.start_state)
+            times.append(1e3 * (time.process_time() - began))
+        figures[len(ball.faces)] = times[0], median(times[1:])
+    return figures
 
 
 def solves(count: int) -> dict[str, float]:
@@ -244,9 +266,16 @@ def main() -> None:
     parser.add_argument("--placements", type=int, default=50)
     given = parser.parse_args()
     few = given.quick
+    drags = live((4, 6) if few else (4, 6, 7, 8), 5 if few else 25)
     figures = {"evaluation": kernels(20 if few else 300), "solves": solves(4 if few else 25)}
     rows = beside_the_authors(1 if few else 2, 200 if few else 1200)
     lines = told(figures, rows, placements(4 if few else given.placements, 8 if few else 200))
+    lines |= {
+        f"a drag's problem made anew, 500 contacts, object of {faces} faces (first, then; processor)": (
+            f"{first:.1f}, {later:.1f} ms"
+        )
+        for faces, (first, later) in drags.items()
+    }
     if few:
         sys.stdout.writelines(f"{name}: {line}\n" for name, line in lines.items())
     else:

@@ -94,6 +94,37 @@ class TriangleMesh:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
 
+    def normals_at(self, vertices: IntArray) -> FloatArray:
+        """(k, 3) the normals of vertices (k,), those of `vertex_normals`, at the cost of the faces round them.
+
+        The first call lists the faces round each vertex of the mesh.
+        """
+        if "vertex_normals" in vars(self):
+            return np.asarray(self.vertex_normals[vertices])
+        wanted = np.unique(vertices)
+        starts, corners = self._corners_of_vertices
+        count = starts[wanted + 1] - starts[wanted]
+        rows = np.repeat(starts[wanted] - np.cumsum(count) + count, count) + np.arange(count.sum())
+        around = self.faces[np.unique(corners[rows] // 3)]  # in order, so that sums round alike
+        used = np.union1d(wanted, around)
+        part = TriangleMesh(self.points[used], np.searchsorted(used, around).reshape(-1, 3))
+        return np.asarray(part.vertex_normals[np.searchsorted(used, vertices)])
+
+    @cached_property
+    def _corners_of_vertices(self) -> tuple[IntArray, IntArray]:
+        """The corners 3 f + k at vertex v are rows starts[v]:starts[v + 1]: starts (n + 1,), corners (3 m,)."""
+        from scipy.sparse import csr_matrix
+
+        corners = np.arange(self.faces.size)  # making a matrix by rows is a counting sort
+        shape = (len(self.points), self.faces.size)
+        table = csr_matrix((np.ones(len(corners), np.int8), (self.faces.ravel(), corners)), shape=shape)
+        return table.indptr, table.indices
+
+    @cached_property
+    def kept(self) -> dict[object, Any]:
+        """What others derive from this mesh and keep as long as it lives, by a key of their own."""
+        return {}
+
     def with_points(self, points: Any) -> TriangleMesh:
         """The same faces with new points (n, 3)."""
         if np.shape(points) != self.points.shape:

@@ -147,9 +147,35 @@ class Rig:
         return TriangleMesh(skin(self, self.rest_world), self.faces)
 
     @cached_property
-    def bound_normals(self) -> FloatArray:
-        """(n, 3) vertex normals of the skin as it was bound."""
-        return TriangleMesh(self.bind_points, self.faces).vertex_normals
+    def bound_surface(self) -> TriangleMesh:
+        """The skin as it was bound."""
+        return TriangleMesh(self.bind_points, self.faces)
+
+    @classmethod
+    def rigid(cls, name: str, mesh: TriangleMesh, *, movable: bool) -> Rig:
+        """A rig of one joint at the centre of a mesh that carries all of it. It is kept with the mesh, and the mesh
+        is its surface, so that what the mesh has computed once (normals, trees, fields) serves every solve."""
+        key = ("rigid rig", name, movable)
+        if key not in mesh.kept:
+            n = len(mesh.points)
+            centre = np.eye(4)
+            centre[:3, 3] = mesh.points.mean(axis=0) if n else 0.0
+            rig = cls(
+                name=name,
+                joints=(name,),
+                parents=np.array([-1]),
+                rest_local=centre[None],
+                bind_world=centre[None],
+                bind_points=mesh.points,
+                faces=mesh.faces,
+                skin_joints=np.zeros((n, 1), np.int64),
+                skin_weights=np.ones((n, 1)),
+                freedoms=(JointFreedom("ball" if movable else "fixed", translates=movable),),
+            )
+            vars(rig).update(bound_surface=mesh, surface=mesh)  # bound at rest: both are the mesh itself
+            mesh.kept[key] = rig
+        kept: Rig = mesh.kept[key]
+        return kept
 
 
 def forward_kinematics(parents: IntArray, local: FloatArray) -> FloatArray:

@@ -131,7 +131,8 @@ def _stacked_watched(tracks: list[Track]) -> Any:
 def point_track(rig: Rig, points: SurfacePoints, first_bone: int = 0) -> Track:
     """The track of points on the skin of a rig; `first_bone` is the column of its first joint."""
     check_points(rig, points)
-    homogeneous = np.concatenate([rig.bind_points, np.ones((len(rig.bind_points), 1))], axis=1)  # (n, 4)
+    corners = rig.bind_points[rig.faces[points.faces].ravel()]
+    homogeneous = np.concatenate([corners, np.ones((len(corners), 1))], axis=1)  # (3k, 4)
     return _blend(rig, points, homogeneous, joint_from_bind(rig), first_bone)
 
 
@@ -142,7 +143,8 @@ def normal_track(rig: Rig, points: SurfacePoints, first_bone: int = 0) -> Track:
     the deformed mesh where the skin bends, equal to it elsewhere.
     """
     check_points(rig, points)
-    return _blend(rig, points, rig.bound_normals, outward_carrier(joint_from_bind(rig)), first_bone)
+    normals = rig.bound_surface.normals_at(rig.faces[points.faces].ravel())  # (3k, 3)
+    return _blend(rig, points, normals, outward_carrier(joint_from_bind(rig)), first_bone)
 
 
 def vertex_track(rig: Rig, vertices: IntArray, first_bone: int = 0) -> Track:
@@ -191,12 +193,12 @@ def check_points(rig: Rig, points: SurfacePoints) -> None:
 
 
 def _blend(rig: Rig, points: SurfacePoints, values: FloatArray, inverse_bind: FloatArray, first_bone: int) -> Track:
-    """Rows sum_c barycentric_c sum_k weight_ck (inverse_bind_k @ value_c) of per-vertex values (n, width)."""
+    """Rows sum_c barycentric_c sum_k weight_ck (inverse_bind_k @ value_c) of values (3k, width) at face corners."""
     influences = rig.skin_joints.shape[1]
     corners = rig.faces[points.faces].ravel()  # (3k,)
     weights = points.barycentric.ravel()[:, None] * rig.skin_weights[corners]  # (3k, K)
     rows = np.repeat(np.arange(len(points)), 3 * influences)
-    spread = np.repeat(values[corners], influences, axis=0)  # (3kK, width)
+    spread = np.repeat(values, influences, axis=0)  # (3kK, width)
     joints = rig.skin_joints[corners].ravel()
     return _gather(rows, joints, weights.ravel(), spread, inverse_bind, len(points), first_bone)
 

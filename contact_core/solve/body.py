@@ -10,7 +10,7 @@ from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.rig.rig import JointFreedom, Pose, Rig
+from contact_core.rig.rig import Pose, Rig
 from contact_core.solve.black_box import BlackBox
 
 
@@ -52,33 +52,14 @@ class Body:
         cls, name: str, mesh: TriangleMesh, *, world_from_surface: FloatArray | None = None, movable: bool = False
     ) -> Body:
         """A surface that stays where it is, or (`movable`) that the solve may move as a whole."""
-        rig = rigid_rig(name, mesh, movable=movable)
+        rig = Rig.rigid(name, mesh, movable=movable)
         return cls(name, rig, Pose.rest(rig), np.eye(4) if world_from_surface is None else world_from_surface)
 
     @classmethod
     def evaluated(cls, name: str, black_box: BlackBox, *, pose: Pose | None = None) -> Body:
         """A body that something else evaluates. pose: its dofs by name (`dof_pose`), by default at rest."""
         start = Pose((), np.zeros((0, 4, 4))) if pose is None else pose
-        return cls(name, rigid_rig(name, black_box.surface, movable=False), start, np.eye(4), black_box)
-
-
-def rigid_rig(name: str, mesh: TriangleMesh, *, movable: bool) -> Rig:
-    """A rig of one joint at the centre of a mesh that carries all of it."""
-    n = len(mesh.points)
-    centre = np.eye(4)
-    centre[:3, 3] = mesh.points.mean(axis=0) if n else 0.0
-    return Rig(
-        name=name,
-        joints=(name,),
-        parents=np.array([-1]),
-        rest_local=centre[None],
-        bind_world=centre[None],
-        bind_points=mesh.points,
-        faces=mesh.faces,
-        skin_joints=np.zeros((n, 1), np.int64),
-        skin_weights=np.ones((n, 1)),
-        freedoms=(JointFreedom("ball" if movable else "fixed", translates=movable),),
-    )
+        return cls(name, Rig.rigid(name, black_box.surface, movable=False), start, np.eye(4), black_box)
 
 
 @dataclass(frozen=True, eq=False)
