@@ -83,6 +83,7 @@ def contact_formats() -> list[object]:
     return [
         "contact_builtins.formats.gltf:GltfFiles",
         "contact_builtins.formats.mesh_files:MeshFiles",
+        "contact_builtins.formats.scene_meshes:SceneMeshFiles",
         "contact_builtins.formats.urdf:UrdfFiles",
     ]
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from json import JSONDecodeError
 from pathlib import Path
 
 from contact_core.errors import FileRefused, InvalidInput
 
+_TOLD = 8  # names in a sentence
 MAX_FILE_BYTES = 1 << 30
+MAX_JOINTS = 4096
 MAX_ELEMENTS = 20_000_000  # vertices, faces, accessor rows: far above any mesh that a person paints on
 
 # What Python raises when a file's own words contradict one another.
@@ -78,8 +80,14 @@ def file_bytes(path: Path) -> bytes:
         raise FileRefused(f"{str(path)!r} cannot be the name of a file.") from error
 
 
-def bounded(count: int, what: str) -> int:
+def bounded(count: int, what: str, most: int = MAX_ELEMENTS) -> int:
     """A count that a file states, if it is believable. Raises InvalidInput."""
-    if not 0 <= count <= MAX_ELEMENTS:
-        raise InvalidInput(f"it states {count} {what}; 0 to {MAX_ELEMENTS} are read")
+    if not 0 <= count <= most:
+        raise InvalidInput(f"it states {count} {what}; 0 to {most} are read")
     return count
+
+
+def named(names: Sequence[str]) -> str:
+    """The first names of a list for a sentence, and how many there are besides."""
+    rest = len(names) - _TOLD
+    return ", ".join(names[:_TOLD]) + (f" and {rest} more" if rest > 0 else "")
