@@ -184,13 +184,12 @@ def beside_the_authors(count: int, most: int) -> list[dict[str, float]]:
             max_iterations=most,
             tolerance=0.0,
             candidates=("current",),
-            more={"algorithm": "LD_MMA"},
             watch=reached,
         )
-        ours = NLoptSolver().solve(problem, mma)
+        ours = NLoptSolver(algorithm="LD_MMA").solve(problem, mma)
         fields = {name: getattr(problem, name) for name in PoseProblem.__dataclass_fields__}
         counted.evaluations = 0
-        authors = NLoptSolver().solve(ForwardDifferences(**fields), mma)
+        authors = NLoptSolver(algorithm="LD_MMA").solve(ForwardDifferences(**fields), mma)
         rows.append(
             {
                 "evaluations": own.evaluations,
@@ -210,15 +209,15 @@ def placements(count: int, starts: int) -> dict[str, float]:
     """Share of random placements that come within 2% of the best objective known."""
     problem = six_patches(0)
     values: dict[str, list[float]] = {"levenberg-marquardt": [], "current only": [], "LD_MMA, 100 evaluations": []}
-    mma = SolveOptions(max_iterations=100, candidates=("current",), more={"algorithm": "LD_MMA"})
+    mma = SolveOptions(max_iterations=100, candidates=("current",))
     for seed in range(count):
         start = placed(problem, seed)
         values["levenberg-marquardt"].append(LevenbergMarquardt().solve(start).value)
         values["current only"].append(
             LevenbergMarquardt().solve(start, SolveOptions(candidates=("current",))).value
         )
-        values["LD_MMA, 100 evaluations"].append(NLoptSolver().solve(start, mma).value)
-    known = MultiStartSolver().solve(problem, SolveOptions(more={"starts": starts})).value
+        values["LD_MMA, 100 evaluations"].append(NLoptSolver(algorithm="LD_MMA").solve(start, mma).value)
+    known = MultiStartSolver(starts=starts).solve(problem).value
     best = min(known, *(min(found) for found in values.values()))
     return {name: float(np.mean(np.array(found) <= 1.02 * best)) for name, found in values.items()}
 

@@ -42,20 +42,20 @@ def contestants(plugins: PluginManager) -> Iterator[Contestant]:
     """Every registered solver; NLopt once per local algorithm that needs no other one, and as in the paper."""
     for name, solver in plugins.offers(POSE_SOLVERS).items():
         if isinstance(solver, NLoptSolver):
-            yield from algorithms(solver)
+            yield from algorithms()
         elif not isinstance(solver, MultiStartSolver):
             yield Contestant(name, solver, SolveOptions())
 
 
-def algorithms(solver: NLoptSolver) -> Iterator[Contestant]:
+def algorithms() -> Iterator[Contestant]:
     """Those without gradients only polish: in fifty dimensions they do not arrive from anywhere else."""
     import nlopt
 
     for name in sorted(dir(nlopt)):
         if name.startswith(("LD_", "LN_")) and "AUGLAG" not in name:  # which only wraps another one
-            options = SolveOptions(max_iterations=1000, more={"algorithm": name})
-            yield Contestant(f"nlopt {name}", solver, options, searches=name.startswith("LD_"))
-    yield Contestant("nlopt, preset paper", solver, SolveOptions(more={"preset": "paper"}))
+            options = SolveOptions(max_iterations=1000)
+            yield Contestant(f"nlopt {name}", NLoptSolver(algorithm=name), options, searches=name.startswith("LD_"))
+    yield Contestant("nlopt, preset paper", NLoptSolver(preset="paper"), SolveOptions())
 
 
 class Found:
@@ -93,7 +93,7 @@ def search(problem: PoseProblem, plugins: PluginManager, starts: int) -> Found:
     """The lowest of all solvers. starts: of multi-start, random placements and finger poses."""
     found = Found(problem)
     solvers, random = list(contestants(plugins)), np.random.default_rng(0)
-    many = plugins.get(POSE_SOLVERS, "multi-start").solve(problem, SolveOptions(more={"starts": starts}))
+    many = plugins.make(POSE_SOLVERS, "multi-start", starts=starts).solve(problem)
     found.search(f"multi-start of {starts}", many.theta)
     for number in range(STARTS):
         start = problem if number == 0 else problem.at(random_start(problem, random))

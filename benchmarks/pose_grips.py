@@ -138,14 +138,14 @@ def placements(grips: Sequence[Grip], count: int, starts: int) -> list[str]:
         "|---" * 8 + "|",
     ]
     rows = {}
-    mma = SolveOptions(max_iterations=100, candidates=("current",), more={"algorithm": "LD_MMA"})
+    mma = SolveOptions(max_iterations=100, candidates=("current",))
     for grip in grips:
         best, earlier = search(grip.problem, PLUGINS, starts), kept(grip.problem, grip.name)
         if earlier is not None:
             best.join(earlier)
         problems = [placed(grip.problem, seed) for seed in range(count)]
         ours = [LevenbergMarquardt().solve(problem) for problem in problems]
-        theirs = [NLoptSolver().solve(problem, mma) for problem in problems]
+        theirs = [NLoptSolver(algorithm="LD_MMA").solve(problem, mma) for problem in problems]
         for by, solutions in (("levenberg-marquardt", ours), ("nlopt LD_MMA", theirs)):
             for solution in solutions:
                 best.judge(by, solution.theta)

@@ -178,7 +178,7 @@ def seated() -> tuple[list[str], list[Picture]]:
     """The chair by stages, and 24 frames from standing to sitting with the feet held by their contacts."""
     scene = chair()
     problem, length = scene.problem, scene.problem.manipulator_length
-    sit = StagedSolver().solve(problem, SolveOptions(more={"stages": STAGES}))
+    sit = StagedSolver(STAGES).solve(problem)
     rows = ["| contact | distance % of the body | within 45° % |", "|---|---|---|"]
     for name, patch in sit.patches.items():
         rows.append(f"| {name} | {100.0 * patch.mean / length:.2f} | {100.0 * patch.opposed_45:.0f} |")

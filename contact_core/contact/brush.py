@@ -6,9 +6,9 @@ screen positions with a callable that turns them into rays.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from contact_core.arrays import FloatArray, frozen
 from contact_core.errors import InvalidInput
@@ -25,7 +25,7 @@ class BrushGesture:
     path: the k surface points that the pointer passed over, in order. screen: (c, 2) control points in the
     host's screen units, and rays: the callable that turns screen positions into rays in surface space, for
     brushes that draw in screen space. radius, spacing: surface units; 0 leaves the choice to the brush.
-    options: the brush's own settings. seed: for brushes that sample; equal gestures give equal points.
+    seed: for brushes that sample; equal gestures give equal points.
     """
 
     mesh: TriangleMesh
@@ -34,7 +34,6 @@ class BrushGesture:
     spacing: float = 0.0
     screen: FloatArray | None = None
     rays: ScreenToRays | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
 
 
@@ -53,10 +52,18 @@ class BrushMark:
 
 @runtime_checkable
 class Brush(Protocol):
-    """Turns a gesture into a mark. `erases`: the mark removes what lies under it instead of adding."""
+    """Turns a gesture into a mark. `erases`: the mark removes what lies under it instead of adding.
 
-    name: str
-    summary: str
-    erases: bool
+    Settings of its own are fields, see `contact_core.settings`.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def summary(self) -> str: ...
+
+    @property
+    def erases(self) -> bool: ...
 
     def mark(self, gesture: BrushGesture) -> BrushMark: ...

@@ -61,8 +61,9 @@ def axis_picks(
         if spec.axis:
             return SurfacePoints.concatenate([locate(point, asset) for point in spec.axis])
         bones, owner = (None, None) if asset.rig is None else bones_of(asset.rig, points)
-        request = AxisRequest(asset.mesh, points, bones, owner, dict(drawn), dict(spec.generator_options))
-        return plugins.get(AXIS_GENERATORS, spec.generator).generate(request)
+        request = AxisRequest(asset.mesh, points, bones, owner, dict(drawn))
+        name = plugins.name_for(AXIS_GENERATORS, "recipe", spec.generator)
+        return plugins.make(AXIS_GENERATORS, name, **spec.generator_options).generate(request)
     except InvalidInput as error:
         raise type(error)(f"the axis of patch {spec.name!r}: {error}") from error
 

@@ -69,7 +69,7 @@ class PatchSpec:
     positions: tuple[Vector, ...] = ()
     disk: DiskSpec | None = None
     axis: tuple[PointSpec, ...] = ()
-    generator: str = "along_bone"
+    generator: str | None = None  # the default for recipes
     generator_options: Mapping[str, Any] = field(default_factory=dict)
     place: RootSpec | None = None
 
@@ -140,7 +140,7 @@ class Recipe:
     away: float = 1.25
     away_direction: Vector | None = None
     coarse: CoarseSpec = field(default_factory=CoarseSpec)
-    placer: str = "from pose"
+    placer: str | None = None  # the default for recipes
     placer_options: Mapping[str, Any] = field(default_factory=dict)
     solve: SolveSpec = field(default_factory=SolveSpec)
     accept: Mapping[str, float] = field(default_factory=dict)

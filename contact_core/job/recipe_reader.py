@@ -64,7 +64,7 @@ def _recipe(top: Table, folder: Path | None) -> Recipe:
         away=scene.number("away", 1.25, at_least=0.0, at_most=100.0),
         away_direction=scene.vector("direction", None, direction=True),
         coarse=_coarse(top.table("coarse", None)),
-        placer=placer.text("name", "from pose"),
+        placer=placer.text("name", None),
         placer_options={key: placer.raw(key) for key in placer.values if key != "name"},
         solve=_solve(top.table("solve", None)),
         accept=_accept(top.table("accept", None)),
@@ -145,7 +145,7 @@ def _patch(table: Table, name: str, joint: str | None) -> PatchSpec:
         positions=table.vectors("positions", ()),
         disk=disk,
         axis=tuple(_point(point, joint) for point in axis.tables("through")) if "through" in axis else (),
-        generator=axis.text("generator", "along_bone"),
+        generator=axis.text("generator", None),
         generator_options={k: axis.raw(k) for k in axis.values if k not in ("through", "generator")},
         place=None if place is None else _root(place),
     )

@@ -131,9 +131,9 @@ def _place(job: Job, plugins: PluginManager) -> None:
 
 
 def place_from(
-    job: Job, plugins: PluginManager, names: list[str], placer: str, pose: Pose, options: Mapping[str, Any]
+    job: Job, plugins: PluginManager, names: list[str], placer: str | None, pose: Pose, options: Mapping[str, Any]
 ) -> PlacementResult:
-    """Ask a placer for roots and directions of patches, the manipulator being in `pose`."""
+    """Ask a placer for roots and directions of patches, the manipulator in `pose`. None: the default placer."""
     request = PlacementRequest(
         rig=job.rig,
         pose=pose,
@@ -141,10 +141,9 @@ def place_from(
         object_from_rig=np.asarray(np.linalg.inv(job.placed)),
         patch_points={name: job.session.points(name) for name in names},
         patch_axes={name: job.session.axis(name).points for name in names},
-        options=options,
         solids=job.solids,
     )
-    return plugins.get(PLACERS, placer).place(request)
+    return plugins.make(PLACERS, plugins.name_for(PLACERS, "recipe", placer), **options).place(request)
 
 
 def target(name: str) -> str:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from contact_core.errors import Cancelled
 from contact_core.job.workpiece import HAND, OBJECT, Job
 from contact_core.plugins.registry import POSE_TERMS
 from contact_core.proposals.proposal import AGAIN, Proposal, SolveSettings
 from contact_core.scene.problem import Objective
+from contact_core.settings import configured
+from contact_core.settings import settings_of as declared_by
 from contact_core.solve.solver import SolveOptions, SolveStatus
 from contact_core.solve.terms import PoseTerm, paper_terms
 
 SOLVE, MOVE, MEASURE = 0.45, 0.55, 0.7  # where these begin, as fractions of the job
+COMMON = tuple(each.name for each in declared_by(SolveOptions))
 
 
 def solve(job: Job) -> None:
@@ -44,6 +48,7 @@ def settings_of(job: Job, candidates: tuple[str, ...] | None = None) -> SolveSet
     options = _options(job, candidates)
     return SolveSettings(
         solver=job.recipe.solve.solver,
+        solver_settings=_own_settings(job),
         options=options,
         objective=Objective(_terms(job), "rig" if job.recipe.solve.limits else "none"),
         solids={OBJECT: job.solids} if job.solids else {},
@@ -57,27 +62,21 @@ def _accept(job: Job, proposal: Proposal) -> None:
 
 
 def _options(job: Job, candidates: tuple[str, ...] | None = None) -> SolveOptions:
-    """The recipe's options; candidates: in place of the recipe's."""
-    wanted = dict(job.recipe.solve.options)
-    own = tuple(wanted.pop("candidates", SolveOptions().candidates))
-    return SolveOptions(
-        max_iterations=wanted.pop("max_iterations", 200),
-        tolerance=wanted.pop("tolerance", 1e-5),
-        candidates=candidates or own,
-        seed=wanted.pop("seed", 0),
-        more=wanted,
-    )
+    """What the recipe says to every solver. candidates: in place of the recipe's."""
+    given = {name: value for name, value in job.recipe.solve.options.items() if name in COMMON}
+    return configured(SolveOptions, given | ({"candidates": candidates} if candidates else {}), "solve.options")
+
+
+def _own_settings(job: Job) -> dict[str, Any]:
+    """What the recipe says to its solver alone."""
+    return {name: value for name, value in job.recipe.solve.options.items() if name not in COMMON}
 
 
 def _terms(job: Job) -> tuple[PoseTerm, ...]:
     spec = job.recipe.solve
     terms = paper_terms(*spec.weights)
     if spec.penetration > 0.0 and job.solids:
-        term = job.session.plugins.get(POSE_TERMS, "penetration")
-        terms += (_made(term)(spec.penetration, solids={OBJECT: job.solids}),)
+        plugins = job.session.plugins
+        name = plugins.name_for(POSE_TERMS, "depth")
+        terms += (plugins.make(POSE_TERMS, name, weight=spec.penetration, solids={OBJECT: job.solids}),)
     return terms
-
-
-def _made(term: object) -> type:
-    """The class of a registered term: the slot holds one made with its defaults."""
-    return term if isinstance(term, type) else type(term)

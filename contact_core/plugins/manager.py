@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, overload
 
 import pluggy
 
@@ -18,9 +18,11 @@ from contact_core.plugins import hookspecs
 from contact_core.plugins.checks import api_refusal, hook_mistakes, is_wrapper
 from contact_core.plugins.discovery import Candidate, discovered
 from contact_core.plugins.record import Offer, PluginRecord
-from contact_core.plugins.registry import SLOTS, Slot, resolve, shortcomings
+from contact_core.plugins.registry import SLOTS, Slot, resolve, roles_of, shortcomings
+from contact_core.settings import Setting, configured, settings_of
 
 T = TypeVar("T")
+U = TypeVar("U")
 MOST_OFFERS = 1_000  # of one hook of one plugin: a generator without an end must not hang the program
 
 __all__ = ["PluginManager", "PluginRecord"]
@@ -40,6 +42,8 @@ class PluginManager:
         self._pluggy.add_hookspecs(hookspecs)
         self._records: dict[str, PluginRecord] = {}  # lowest precedence first
         self._filled: dict[str, Mapping[str, Any]] = {}  # hook -> objects by name
+        self._factories: dict[str, dict[str, Any]] = {}  # hook -> what makes them, by name
+        self._roles: dict[str, dict[str, tuple[str, ...]]] = {}  # hook -> what they are the default for, by name
         for candidate in discovered(environ) if discover else ():
             self._try(candidate)
         for plugin in plugins:
@@ -88,6 +92,41 @@ class PluginManager:
             + (f" Not available here: {' '.join(absent)}" if absent else "")
             + (f" Plugins with problems (see `contact plugins`): {', '.join(failed)}." if failed else "")
         )
+
+    @overload
+    def make(self, slot: Slot[type[U]], name: str, **settings: Any) -> U: ...
+    @overload
+    def make(self, slot: Slot[T], name: str, **settings: Any) -> T: ...
+    def make(self, slot: Slot[Any], name: str, **settings: Any) -> Any:
+        """An object by name, with settings and data by keyword.
+
+        Raises InvalidInput as `get` does, and for a setting that it does not have or a value that it refuses.
+        """
+        self.get(slot, name)
+        return configured(self._factories[slot.hook][name], settings, f"the {slot.noun} {name!r}")
+
+    def settings_of(self, slot: Slot[Any], name: str) -> tuple[Setting, ...]:
+        """The settings of an object, in its own order: what a panel shows. Raises InvalidInput as `get` does."""
+        self.get(slot, name)
+        return settings_of(self._factories[slot.hook][name])
+
+    def name_for(self, slot: Slot[Any], role: str, name: str | None = None) -> str:
+        """The name that was given; without one, that of the object which says `default_for = role`, of the highest
+        precedence; the first offered where none does and it is the slot's `first_is`.
+
+        Raises InvalidInput where there is none.
+        """
+        if name is not None:
+            return name
+        offers = self.offers(slot)
+        declared = [key for key, roles in self._roles[slot.hook].items() if role in roles]
+        if not declared and role == slot.first_is:
+            declared = list(offers)[:1]
+        if not declared:
+            raise InvalidInput(
+                f"no {slot.noun} is the default for {role!r}: name one; there are: {', '.join(offers) or 'none'}."
+            )
+        return declared[-1]
 
     def refuse(self, slot: Slot[Any], name: str, reason: str) -> None:
         """Take an object out that proved unsound when it was used; the reason is a problem of its plugin."""
@@ -193,12 +232,15 @@ class PluginManager:
     def _fill(self, slot: Slot[Any]) -> dict[str, Any]:
         """Objects by name over all plugins, lowest precedence first, duplicates refused unless they replace."""
         filled: dict[str, Any] = dict(resolve(slot.core)) if slot.core else {}
+        factories = self._factories[slot.hook] = dict(filled)
+        roles: dict[str, tuple[str, ...]] = dict.fromkeys(filled, ())
+        self._roles[slot.hook] = roles
         owner = dict.fromkeys(filled, "contact-core itself")
         for record in tuple(self._records.values()):
             if slot.hook not in record.collected:
                 record.collected[slot.hook] = self._collect(record, slot)
             record.offers.pop(slot.noun, None)
-            for name, made, replaces in record.collected[slot.hook]:
+            for name, made, factory, replaces in record.collected[slot.hook]:
                 replaced = {*replaces, *record.replaces} & filled.keys()
                 if name in filled and name not in replaced:
                     record.complain(
@@ -209,7 +251,9 @@ class PluginManager:
                 for nobody in set(replaces) - filled.keys() - {name}:
                     self._miss(record, slot, name, nobody, filled)
                 for key in {name, *replaced}:
-                    filled[key], owner[key] = made, f"the plugin {record.name!r} ({record.source})"
+                    filled[key], factories[key] = made, factory
+                    roles[key] = roles_of(made) or roles.get(key, ())  # of what it takes the place of
+                    owner[key] = f"the plugin {record.name!r} ({record.source})"
                 record.offers.setdefault(slot.noun, []).append(name)
         return filled
 
@@ -227,20 +271,15 @@ def _examined(record: PluginRecord, slot: Slot[Any], offered: Any) -> list[Offer
     """What is behind an offer, in a list; none where it is unsound, which is written down."""
     label = offered if isinstance(offered, str) else repr(_type_of(offered).__qualname__)
     with record.bearing(f"its {slot.noun} {label} cannot be made:", f"{slot.noun} {label}: "):
-        made = _made(offered, slot)
+        factory = resolve(offered) if isinstance(offered, str) else offered
+        made = factory() if slot.instances and isinstance(factory, type) else factory
         lacks = shortcomings(made, slot)
         if not lacks:
             replaces = getattr(made, "replaces", ())
             words = (replaces,) if isinstance(replaces, str) else tuple(replaces)
-            return [Offer(getattr(made, slot.key), made, words)]
+            return [Offer(getattr(made, slot.key), made, factory, words)]
         record.complain(f"its {slot.noun} {label} is refused: {'; '.join(lacks)}.")
     return []
-
-
-def _made(offered: Any, slot: Slot[Any]) -> Any:
-    """The object behind an offer: references are imported, classes called where the slot holds instances."""
-    found = resolve(offered) if isinstance(offered, str) else offered
-    return found() if slot.instances and isinstance(found, type) else found
 
 
 def _type_of(offered: Any) -> type:

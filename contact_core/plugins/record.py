@@ -14,10 +14,12 @@ from contact_core.plugins.discovery import Origin
 
 
 class Offer(NamedTuple):
-    """A sound object of a plugin. replaces: names of objects whose place it takes."""
+    """A sound object of a plugin. factory: what it is made of again with other settings, its class or itself.
+    replaces: names of objects whose place it takes."""
 
     name: str
     made: Any
+    factory: Any
     replaces: tuple[str, ...]
 
 

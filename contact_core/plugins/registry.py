@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from contact_core.errors import InvalidInput
+from contact_core.settings import declaration_mistakes, is_frozen_dataclass
 
 if TYPE_CHECKING:
     from contact_core.contact.axis_generator import AxisGenerator
@@ -29,7 +30,9 @@ class Slot(Generic[T_co]):
 
     hook: the hook that asks for it.  noun: what people call it.  protocol: "module:Name" of what it must satisfy.
     key: the attribute that names an object.  instances: whether the slot holds instances (else classes).
-    core: "module:Name" of a mapping of what the core itself offers, beneath all plugins.
+    core: "module:Name" of a mapping of what the core itself offers, beneath all plugins.  roles: what an object may
+    be the default for, by its attribute `default_for`: the core names no plugin, it asks for the default of a role.
+    first_is: the role for which the first offered stands where no object says so.
     """
 
     hook: str
@@ -38,15 +41,25 @@ class Slot(Generic[T_co]):
     key: str = "name"
     instances: bool = True
     core: str = ""
+    roles: tuple[str, ...] = ()
+    first_is: str = ""
 
 
 BRUSHES: Slot[Brush] = Slot("contact_brushes", "brush", "contact_core.contact.brush:Brush")
 AXIS_GENERATORS: Slot[AxisGenerator] = Slot(
-    "contact_axis_generators", "axis generator", "contact_core.contact.axis_generator:AxisGenerator"
+    "contact_axis_generators", "axis generator", "contact_core.contact.axis_generator:AxisGenerator",
+    roles=("paint", "recipe"), first_is="paint",
+)  # fmt: skip
+PLACERS: Slot[Placer] = Slot(
+    "contact_placers", "placer", "contact_core.plugins.slots:Placer", roles=("settle", "recipe")
 )
-PLACERS: Slot[Placer] = Slot("contact_placers", "placer", "contact_core.plugins.slots:Placer")
-POSE_SOLVERS: Slot[PoseSolver] = Slot("contact_pose_solvers", "pose solver", "contact_core.solve.solver:PoseSolver")
-POSE_TERMS: Slot[PoseTerm] = Slot("contact_pose_terms", "pose term", "contact_core.solve.terms:PoseTerm")
+POSE_SOLVERS: Slot[PoseSolver] = Slot(
+    "contact_pose_solvers", "pose solver", "contact_core.solve.solver:PoseSolver",
+    roles=("solve",), first_is="solve",
+)  # fmt: skip
+POSE_TERMS: Slot[type[PoseTerm]] = Slot(
+    "contact_pose_terms", "pose term", "contact_core.solve.terms:PoseTerm", instances=False, roles=("depth",)
+)
 GEODESIC_ENGINES: Slot[GeodesicEngine] = Slot(
     "contact_geodesic_engines", "geodesic engine", "contact_core.geometry.engine:GeodesicEngine"
 )
@@ -101,6 +114,12 @@ def shortcomings(candidate: object, slot: Slot[Any]) -> list[str]:
             result += _call_shortcomings(name, member, getattr(candidate, name), bound=slot.instances)
     if not slot.instances and not isinstance(candidate, type):
         result.append("is an object where a class is wanted")
+    result += declaration_mistakes(candidate)
+    result += [
+        f"is default_for {role!r}; a {slot.noun} may be that for: {', '.join(slot.roles) or 'nothing'}"
+        for role in roles_of(candidate)
+        if role not in slot.roles
+    ]
     if slot is COMMANDS and not is_frozen_dataclass(candidate):
         result.append("is no frozen dataclass, whose fields a journal could hold")
     key = getattr(candidate, slot.key, None)
@@ -109,10 +128,11 @@ def shortcomings(candidate: object, slot: Slot[Any]) -> list[str]:
     return result
 
 
-def is_frozen_dataclass(candidate: object) -> bool:
-    """Whether this is a class of values that do not change."""
-    parameters = getattr(candidate, "__dataclass_params__", None)
-    return isinstance(candidate, type) and parameters is not None and parameters.frozen
+def roles_of(candidate: object) -> tuple[str, ...]:
+    """What an object says it is the default for; its own word, not that of a class which it derives from."""
+    kind = candidate if isinstance(candidate, type) else type(candidate)
+    roles = kind.__dict__.get("default_for", ())
+    return (roles,) if isinstance(roles, str) else tuple(roles)
 
 
 def _members(protocol: type) -> dict[str, Any]:

@@ -8,8 +8,8 @@ The protocols of the other slots live with what they serve: `contact.brush.Brush
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
 
 if TYPE_CHECKING:  # so that `contact --help`, which asks for sub-commands, loads no numpy
     import argparse
@@ -75,8 +75,9 @@ class PlacementRequest:
     """What a placer gets: a posed manipulator, an object, and the patches to place.
 
     object_from_rig: (4, 4) takes rig space to object surface space. patch_points, patch_axes: per patch name,
-    on the manipulator's surface. options: the recipe's own settings for this placer. solids: closed surfaces in the
-    object's space whose inside is out of bounds too, such as the filled body of a cup.
+    on the manipulator's surface. reach: patches farther away than this are left out, in manipulator lengths; None
+    leaves it to the placer. solids: closed surfaces in the object's space whose inside is out of bounds too, such
+    as the filled body of a cup.
     """
 
     rig: Rig
@@ -85,7 +86,7 @@ class PlacementRequest:
     object_from_rig: FloatArray
     patch_points: Mapping[str, SurfacePoints]
     patch_axes: Mapping[str, SurfacePoints]
-    options: Mapping[str, Any] = field(default_factory=dict)
+    reach: float | None = None
     solids: tuple[TriangleMesh, ...] = ()
 
 
@@ -111,9 +112,16 @@ class PlacementResult:
 
 @runtime_checkable
 class Placer(Protocol):
-    """Chooses roots and headings on the object from a coarse pose (hook `contact_placers`)."""
+    """Chooses roots and headings on the object from a coarse pose (hook `contact_placers`).
 
-    name: str
+    Settings of its own are fields, see `contact_core.settings`.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def summary(self) -> str: ...
 
     def place(self, request: PlacementRequest) -> PlacementResult: ...
 

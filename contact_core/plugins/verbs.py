@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from contact_core.edit.announcer import DocumentChanged
 from contact_core.edit.verbs import SurfaceVerbs, Verbs
@@ -42,16 +42,17 @@ class PluginVerbs(Verbs, SurfaceVerbs):
         if generator is None and offered:
             generator = self.plugins.choose(
                 "contact_choose_axis_generator", offered, surface=surface, patch=patch
-            ) or next(iter(offered))
+            ) or self.plugins.name_for(AXIS_GENERATORS, "paint")
         if generator is None:
             return super().default_axis(surface, patch, points, generator)
         return self.plugins.get(AXIS_GENERATORS, generator).generate(self.axis_request(surface, patch, points))
 
-    def named_brush(self, name: str) -> Brush:
-        """A brush of this session's plugins. Raises InvalidInput that lists what there is."""
+    def named_brush(self, name: str, **settings: Any) -> Brush:
+        """A brush of this session's plugins. Raises InvalidInput that lists what there is, and for settings that
+        it does not have or refuses."""
         from contact_core.plugins.registry import BRUSHES
 
-        return self.plugins.get(BRUSHES, name)
+        return self.plugins.make(BRUSHES, name, **settings)
 
     def named_engine(self, name: str) -> GeodesicEngine:
         """A geodesic engine of this session's plugins. Raises InvalidInput that lists what there is."""

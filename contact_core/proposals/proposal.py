@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,7 +34,6 @@ from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, So
 if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
 
-PLACER = "from pose"
 AGAIN = ("current",)  # starting candidates once there is a pose
 
 
@@ -65,13 +64,15 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class SolveSettings:
-    """How to solve. solver: a name; None leaves the choice to the plugins. objective: terms, limits, what is free.
+    """How to solve. solver: a name; None leaves the choice to the plugins. solver_settings: its own. objective: terms,
+    limits, what is free.
 
     solids: closed meshes by surface, in its space, whose inside is out of bounds; by default each surface that
     does not bend is its own. Give filled bodies of what is hollow.
     """
 
     solver: str | None = None
+    solver_settings: Mapping[str, Any] = field(default_factory=dict)
     options: SolveOptions | None = None
     objective: Objective = field(default_factory=Objective)
     progress: Progress = NO_PROGRESS
@@ -80,7 +81,7 @@ class SolveSettings:
     def solver_of(self, plugins: PluginManager) -> PoseSolver:
         """The solver; the core's own where no plugin offers any."""
         by_plugin = self.solver is not None or plugins.offers(POSE_SOLVERS)
-        return PluginSolver(plugins, self.solver) if by_plugin else LevenbergMarquardt()
+        return PluginSolver(plugins, self.solver, self.solver_settings) if by_plugin else LevenbergMarquardt()
 
     def options_of(self, draft: Draft) -> SolveOptions:
         """The options; by default a rig that has a pose starts from it alone."""
@@ -244,10 +245,10 @@ def _place_all(draft: Draft, plugins: PluginManager, reach: float, solids: Solid
             object_from_rig=np.asarray(np.linalg.inv(world[thing]) @ world[hand]),
             patch_points={name: draft.points(pair.manipulator) for name, pair in pairs.items()},
             patch_axes={name: draft.axis(pair.manipulator).points for name, pair in pairs.items()},
-            options={"far": reach},
+            reach=reach,
             solids=tuple(solids.get(thing, ())),
         )
-        result = plugins.get(PLACERS, PLACER).place(request)
+        result = plugins.get(PLACERS, plugins.name_for(PLACERS, "settle")).place(request)
         for name, place in result.placed.items():
             draft.place(pairs[name].object, place.root, direction=place.direction)
         left_out.update(result.left_out)

@@ -106,8 +106,8 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
     ) -> Proposal:
         """Propose every contact at the closest point of its object that faces it, the pose solved again, in rounds.
 
-        Needs a placer called "from pose". reach: contacts farther away than this stay, in manipulator lengths.
-        Raises InvalidInput without a pair to settle, and Cancelled.
+        Needs a placer that is the default for "settle". reach: contacts farther away than this stay, in manipulator
+        lengths. Raises InvalidInput without a pair to settle, and Cancelled.
         """
         from contact_core.proposals.proposal import SolveSettings, settle
 

@@ -33,13 +33,13 @@ class LevenbergMarquardt:
     """Bounded Levenberg-Marquardt over the starting candidates; deterministic."""
 
     name = "levenberg-marquardt"
+    default_for = "solve"
     summary = "Bounded Levenberg-Marquardt from the current pose and two rigid fits; the default."
 
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
-        options.check_settings(self.name)
         with one_blas_thread():
             return self._solve(problem, options, progress)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -17,6 +17,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.inside import depth_inside
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.rig.skinning import Track, vertex_track
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.state import PoseState
 from contact_core.solve.terms import BoundTerm
@@ -32,7 +33,7 @@ RESOLUTION = 64  # nodes along the longest side of a field
 
 
 @dataclass(frozen=True, eq=False)
-class PenetrationTerm:
+class PenetrationTerm(HasSettings):
     """sum a_v max(0, -s_v / l)^2 / (10 l^2) over skin vertices v, s the signed distance to the nearest solid.
 
     Ten l^2 are ten finger pads: skin of that area one l deep costs as much as all contacts one l apart,
@@ -43,11 +44,15 @@ class PenetrationTerm:
     the skin of a body. resolution: of the distance field.
     """
 
-    weight: float = 5.0
+    summary: ClassVar[str] = "skin stays out of what is solid"
+    default_for: ClassVar[str] = "depth"
+    weight: float = setting(5.0, low=0.0, help="how much it counts beside the other terms")
+    samples: int = setting(1500, low=10, high=1_000_000, help="how many vertices stand for the skin of a body")
+    resolution: int = setting(
+        RESOLUTION, low=4, high=512, unit="nodes", help="nodes of the distance field along the solid's longest side"
+    )
     solids: Solids | None = None
     skins: Sequence[str] | None = None
-    samples: int = 1500
-    resolution: int = RESOLUTION
     name: str = field(default="penetration")
 
     def bind(self, problem: PoseProblem) -> BoundTerm:
@@ -74,15 +79,16 @@ class Allowance(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class NoDeeperTerm:
+class NoDeeperTerm(HasSettings):
     """sum max(0, -s_v / l - allowed_v)^2 over skin vertices v: a wall rather than a price.
 
     One vertex an l deeper than it may be costs as much as all contacts one l apart, whatever its area, for it is
     the deepest that matters. allowed: by name of the skinned body. solids, resolution: as for penetration.
     """
 
+    summary: ClassVar[str] = "no skin vertex goes deeper than it may"
     allowed: Mapping[str, Allowance]
-    weight: float = 1.0
+    weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     solids: Solids | None = None
     resolution: int = RESOLUTION
     name: str = field(default="no deeper")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.rig import Pose
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.state import PoseState
 
@@ -47,9 +48,12 @@ class Iteration:
         return self.problem.poses(self.theta)
 
 
+CANDIDATES = ("current", "positions", "normals")
+
+
 @dataclass(frozen=True)
-class SolveOptions:
-    """What every solver understands; `more` holds a solver's own settings by name.
+class SolveOptions(HasSettings):
+    """What every solver understands; its own settings are fields of the solver (`contact_core.settings`).
 
     max_iterations: over all starts of one stage. tolerance: relative decrease of the objective below which a
     pose counts as settled. candidates: where to start from, of "current", "positions" (rigid fit of the paired
@@ -57,43 +61,34 @@ class SolveOptions:
     iteration with its pose, for a ghost that moves along; it may raise Cancelled, as progress may.
     """
 
-    max_iterations: int = 200
-    tolerance: float = 1e-5
-    candidates: tuple[str, ...] = ("current", "positions", "normals")
-    seed: int = 0
-    more: Mapping[str, Any] = field(default_factory=dict)
+    max_iterations: int = setting(200, low=1, help="how many iterations at most, over all starts of one stage")
+    tolerance: float = setting(
+        1e-5, low=0.0, help="relative decrease of the objective below which a pose counts as settled"
+    )
+    candidates: tuple[str, ...] = setting(
+        CANDIDATES, choices=CANDIDATES, help="where to start from: the current pose, and rigid fits of the contacts"
+    )
+    seed: int = setting(0, low=0, high=2**32 - 1, help="of solvers that start at random")
     watch: Callable[[Iteration], object] | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        known = ("current", "positions", "normals")
-        if not self.candidates or any(candidate not in known for candidate in self.candidates):
-            raise InvalidInput(
-                "candidates are some of current, positions, normals, at least one, but got"
-                f" {list(self.candidates)}."
-            )
-        if self.max_iterations < 1 or not self.tolerance >= 0.0:
-            raise InvalidInput(
-                f"max_iterations must be at least 1 and tolerance at least 0, but got {self.max_iterations} and"
-                f" {self.tolerance}."
-            )
-
-    def check_settings(self, solver: str, known: tuple[str, ...] = ()) -> None:
-        """Raises InvalidInput when `more` holds a setting that a solver does not know."""
-        unknown = sorted(set(self.more) - set(known))
-        if unknown:
-            listed = ", ".join(known) or "none"
-            raise InvalidInput(
-                f"{solver} has no setting {unknown[0]!r}; its settings: {listed}."
-                " Every solver knows max_iterations, tolerance, candidates and seed."
-            )
+        super().__post_init__()
+        if not self.candidates:
+            raise InvalidInput(f"candidates are some of {', '.join(CANDIDATES)}, at least one, but got none.")
 
 
 @runtime_checkable
 class PoseSolver(Protocol):
-    """Something that poses (hook `contact_pose_solvers`)."""
+    """Something that poses (hook `contact_pose_solvers`).
 
-    name: str
-    summary: str
+    Settings of its own are fields, see `contact_core.settings`.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def summary(self) -> str: ...
 
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
 from contact_core.arrays import FloatArray
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.state import PoseState
 
 if TYPE_CHECKING:
@@ -43,10 +44,16 @@ class BoundTerm(Protocol):
 
 @runtime_checkable
 class PoseTerm(Protocol):
-    """One term of the objective (hook `contact_pose_terms`)."""
+    """One term of the objective (hook `contact_pose_terms`, which takes classes: a problem makes its own).
+
+    Settings, the weight among them, are fields, see `contact_core.settings`; data such as solids are other fields.
+    """
 
     @property
     def name(self) -> str: ...
+
+    @property
+    def summary(self) -> str: ...
 
     @property
     def weight(self) -> float: ...
@@ -80,10 +87,11 @@ class LeastSquares(ABC):
 
 
 @dataclass(frozen=True)
-class DistanceTerm:
+class DistanceTerm(HasSettings):
     """(1/A) sum a_i rho(d_i / l) over contact pairs: rho(x) = x^2 ("squares") or x ("paper")."""
 
-    weight: float = 1.0
+    summary: ClassVar[str] = "contact points that are paired come together"
+    weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "distance"
 
     def bind(self, problem: PoseProblem) -> BoundTerm:
@@ -132,10 +140,11 @@ class _Distances:
 
 
 @dataclass(frozen=True)
-class NormalTerm:
+class NormalTerm(HasSettings):
     """(1/A) sum a_i (1 + n_i . n'_i): surfaces that touch face each other. Half the square of n + n'."""
 
-    weight: float = 1.0
+    summary: ClassVar[str] = "surfaces that touch face each other"
+    weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "normal"
 
     def bind(self, problem: PoseProblem) -> BoundTerm:
@@ -184,10 +193,11 @@ def _lengths(vectors: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class PriorTerm:
+class PriorTerm(HasSettings):
     """(1/N_ref) sum_j w_j rho(theta_j - prior_j) over the dofs that do not place the whole manipulator."""
 
-    weight: float = 10.0
+    summary: ClassVar[str] = "joints stay near the pose that they start from, or rest"
+    weight: float = setting(10.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "prior"
 
     def bind(self, problem: PoseProblem) -> BoundTerm:

@@ -14,6 +14,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.testing import meshes
 from contact_core.testing.contract import Contract, needs
+from contact_core.testing.settings_checks import check_settings
 
 PATCHES = ("strip", "disk", "bent", "rough")
 
@@ -211,6 +212,10 @@ class AxisGeneratorContract(Contract):
         assert apart.max() <= tolerance, (
             f"the axes lie {apart.max():.3g} apart (at most {tolerance:.1e} is allowed)"
         )
+
+    def test_a15_declares_its_settings(self, generator: AxisGenerator) -> None:
+        """Its settings say unit, range and help; a value out of range and a name it does not know are refused."""
+        check_settings(generator)
 
 
 def _same(first: AxisRequest, axis: SurfacePoints, second: AxisRequest, other: SurfacePoints) -> None:

@@ -21,6 +21,7 @@ from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.testing import meshes
 from contact_core.testing.contract import Contract, needs
+from contact_core.testing.settings_checks import check_settings
 
 GESTURES = ("flat", "saddle", "ridge")
 
@@ -170,6 +171,10 @@ class BrushContract(Contract):
         few = len(brush.mark(drawn(coarse, np.array([1.0, 1.0]))).points)
         many = len(brush.mark(drawn(dense, np.array([1.0, 1.0]))).points)
         assert 0.75 <= many / few <= 1.34, (few, many)
+
+    def test_b13_declares_its_settings(self, brush: Brush) -> None:
+        """Its settings say unit, range and help; a value out of range and a name it does not know are refused."""
+        check_settings(brush)
 
 
 def _dense(stroke: BrushGesture) -> SurfacePoints:

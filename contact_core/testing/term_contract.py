@@ -15,6 +15,7 @@ from contact_core.solve.problem import PoseProblem
 from contact_core.solve.terms import PoseTerm
 from contact_core.testing import meshes, rigs
 from contact_core.testing.contract import Contract, needs
+from contact_core.testing.settings_checks import check_settings
 
 STEP = 1e-5
 SEEDS = (0, 1, 2)
@@ -61,8 +62,9 @@ class TermContract(Contract):
         return scene()
 
     def test_t01_is_named(self, term: PoseTerm) -> None:
-        """Has a name and a weight."""
+        """Has a name and a weight, and says in a sentence what it does."""
         assert term.name == term.name.strip() != ""
+        assert len(term.summary.split()) >= 3, term.summary
         assert term.weight > 0.0
 
     @pytest.mark.parametrize("seed", SEEDS)
@@ -128,6 +130,10 @@ class TermContract(Contract):
             answers.append((fresh.value(state), fresh.gradient(state), fresh.normal_matrix(state)))
         assert answers[0][0] == answers[1][0]
         assert all(np.array_equal(one, two) for one, two in zip(answers[0][1:], answers[1][1:], strict=True))
+
+    def test_t09_declares_its_settings(self, term: PoseTerm) -> None:
+        """Its settings say unit, range and help; a value out of range and a name it does not know are refused."""
+        check_settings(term)
 
     @staticmethod
     def somewhere(problem: PoseProblem, seed: int) -> FloatArray:

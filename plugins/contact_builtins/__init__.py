@@ -24,7 +24,7 @@ def contact_brushes() -> list[object]:
 @hookimpl
 def contact_axis_generators() -> list[object]:
     return [
-        "contact_builtins.axes.guided:Guided",  # the first is what a session takes by default
+        "contact_builtins.axes.guided:Guided",
         "contact_builtins.axes.consistent:Consistent",
         "contact_builtins.axes.along_bone:AlongBone",
         "contact_builtins.axes.principal:Principal",

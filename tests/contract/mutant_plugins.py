@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from contact_core.contact.brush import BrushGesture, BrushMark
 from contact_core.document.asset import Asset
 from contact_core.geometry import SurfacePoints
 from contact_core.rig.rig import Pose
+from contact_core.settings import setting
 from contact_core.testing.axis_generator_contract import AxisGeneratorContract
 from contact_core.testing.brush_contract import BrushContract
 from contact_core.testing.format_contract import FormatContract
@@ -74,6 +75,13 @@ class InMetres(Principal):
         axis = super().generate(request)
         at = axis.positions(request.mesh)
         return axis if np.linalg.norm(at[-1] - at[0]) > 0.1 else axis[::-1]
+
+
+@dataclass(frozen=True)
+class Unchecked(Principal):
+    """Declares a setting and takes any value for it."""
+
+    longer: float = setting(1.5, low=1.0, high=2.0, help="how much longer it is made")
 
 
 class BackAndForth(Principal):
@@ -142,6 +150,10 @@ class TestInMetres(GeneratorMutant):
     made, breaks = InMetres, "A07"
 
 
+class TestUnchecked(GeneratorMutant):
+    made, breaks = Unchecked, "A15"
+
+
 class TestBackAndForth(GeneratorMutant):
     made, breaks = BackAndForth, "A10"
 
@@ -186,6 +198,13 @@ class Sparse(DiskBrush):
         return super().mark(replace(gesture, spacing=3.0 * gesture.spacing))
 
 
+@dataclass(frozen=True)
+class Helpless(DiskBrush):
+    """Has a setting that no artist understands."""
+
+    q: float = setting(1.0, low=0.0, help="q factor")
+
+
 class Crowded(DiskBrush):
     """Makes the spacing less than half of what was asked for."""
 
@@ -221,6 +240,10 @@ class TestSparse(BrushMutant):
 
 class TestCrowded(BrushMutant):
     made, breaks = Crowded, "B11"
+
+
+class TestHelpless(BrushMutant):
+    made, breaks = Helpless, "B13"
 
 
 # -- formats -------------------------------------------------------------------------------------------------------

@@ -1,21 +1,24 @@
-"""Solvers that are broken on purpose, each in one way; `breaks` says which clause must see it first."""
+"""Solvers, and a term, broken on purpose, each in one way; `breaks` says which clause must see it first."""
 
 from __future__ import annotations
 
 import contextlib
 import itertools
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from contact_core.errors import Cancelled
 from contact_core.progress import NO_PROGRESS, CallbackProgress, Progress
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
+from contact_core.solve.terms import DistanceTerm, PoseTerm
 from contact_core.testing.mutants import Mutant
 from contact_core.testing.solver_contract import SolverContract
+from contact_core.testing.term_contract import TermContract
 
 
 class Sound(LevenbergMarquardt):
@@ -94,6 +97,23 @@ class Receding(Sound):
         return super().solve(problem, options, progress.part(1.0, 0.0))
 
 
+@dataclass(frozen=True)
+class Trusting(Sound, HasSettings):
+    """Checks no setting that it is made with."""
+
+    patience: int = setting(3, low=1, high=9, help="how long it goes on")
+
+    def __post_init__(self) -> None:
+        pass
+
+
+@dataclass(frozen=True)
+class Terse(DistanceTerm):
+    """A term with a setting that says nothing about itself."""
+
+    sharpness: float = setting(1.0, low=0.0, help="sharpness")
+
+
 class Presuming(Sound):
     """Moves what is held."""
 
@@ -151,6 +171,22 @@ class TestReceding(Mutant, SolverContract):
     @pytest.fixture
     def solver(self) -> PoseSolver:
         return Receding()
+
+
+class TestTrusting(Mutant, SolverContract):
+    breaks = "S18"
+
+    @pytest.fixture
+    def solver(self) -> PoseSolver:
+        return Trusting()
+
+
+class TestTerse(Mutant, TermContract):
+    breaks = "T09"
+
+    @pytest.fixture
+    def term(self) -> PoseTerm:
+        return Terse()
 
 
 class TestPresuming(Mutant, SolverContract):

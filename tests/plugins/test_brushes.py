@@ -68,8 +68,8 @@ class TestLasso(BrushContract):
 
 @pytest.mark.parametrize("falloff", ["linear", "smooth"])
 def test_strength_falls_off_with_the_distance_over_the_surface(falloff: str) -> None:
-    stroke = replace(gesture("saddle"), path=gesture("saddle").path[0], options={"falloff": falloff})
-    mark = DiskBrush().mark(stroke)
+    stroke = replace(gesture("saddle"), path=gesture("saddle").path[0])
+    mark = DiskBrush(falloff=falloff).mark(stroke)  # type: ignore[arg-type]
     distance = log_map(stroke.mesh, stroke.path, mark.points).distance
     order = np.argsort(distance)
     assert (np.diff(mark.strength[order]) <= 1e-9).all()
@@ -77,8 +77,8 @@ def test_strength_falls_off_with_the_distance_over_the_surface(falloff: str) -> 
 
 
 def test_an_unknown_falloff_lists_those_that_there_are() -> None:
-    with pytest.raises(InvalidInput, match="none, linear, smooth, but 'cubic' came"):
-        DiskBrush().mark(replace(gesture("flat"), options={"falloff": "cubic"}))
+    with pytest.raises(InvalidInput, match="none, linear, smooth, but got 'cubic'"):
+        DiskBrush(falloff="cubic")  # type: ignore[arg-type]
 
 
 def test_a_disk_in_one_huge_face_gets_as_many_points_as_anywhere() -> None:
@@ -148,7 +148,7 @@ def test_several_strokes_of_a_curve_are_not_joined() -> None:
     sheet = meshes.plane(8, 2.0)
     stroke = drawn(sheet, np.array([1.0, 1.0]))
     lines = np.array([[0.2, 0.2], [0.8, 0.2], [1.2, 1.8], [1.8, 1.8]])
-    at = CurveBrush().mark(replace(stroke, screen=lines, options={"starts": [2]})).points.positions(sheet)
+    at = CurveBrush(starts=(2,)).mark(replace(stroke, screen=lines)).points.positions(sheet)
     assert set(np.round(at[:, 1], 9)) == {0.2, 1.8}
 
 

@@ -26,7 +26,10 @@ from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.rig.rig import Pose, skin
 from contact_core.rig.rig import forward_kinematics as forward
+from contact_core.settings import configured
+from contact_core.testing.settings_checks import check_settings
 
+UPWARD = (0.0, 0.0, 1.0)
 UP = np.array([0.0, 0.0, 1.0])  # the palm of the built-in hands looks along +z
 
 
@@ -35,7 +38,7 @@ def job() -> Job:
     return perform(demo_recipe("alien"), PluginManager())
 
 
-def request(options: dict[str, object] | None = None) -> PlacementRequest:
+def request() -> PlacementRequest:
     """The alien hand open beside the pole."""
     done = job()
     names = list(done.metrics["patches"])
@@ -46,7 +49,6 @@ def request(options: dict[str, object] | None = None) -> PlacementRequest:
         object_from_rig=np.asarray(np.linalg.inv(done.placed)),
         patch_points={name: done.session.points(name) for name in names},
         patch_axes={name: done.session.axis(name).points for name in names},
-        options=done.recipe.placer_options if options is None else options,
         solids=done.solids,
     )
 
@@ -119,7 +121,7 @@ def test_the_thumb_search_is_never_worse_than_leaving_the_thumb_open() -> None:
 
 def test_pads_land_on_faces_that_face_them_and_the_middle_of_the_axis_comes_there() -> None:
     ask = replace(request(), pose=coarse_pose(job().rig, job().recipe.coarse))
-    result = FromPose().place(ask)
+    result = configured(FromPose, job().recipe.placer_options, "it").place(ask)
     assert result.pose is not None and not result.left_out
     hand = HandPose(replace(ask, pose=result.pose))
     for name, pad in pads_of(ask, hand).items():
@@ -149,9 +151,9 @@ def turned(ask: PlacementRequest) -> tuple[PlacementRequest, FloatArray]:
 
 def test_placing_does_not_depend_on_where_the_object_has_its_origin() -> None:
     """Closest points are equivariant; the distance field's grid is not, by less than two of its cells."""
-    ask = request({"approach": [0, 0, 1], "without": ["thumb*"]})
+    ask, naive = request(), Naive(approach=UPWARD, without=("thumb*",))
     other, moved = turned(ask)
-    here, there = Naive().place(ask), Naive().place(other)
+    here, there = naive.place(ask), naive.place(other)
     cell = HandPose(ask).fields[0].spacing
     for name, placed in here.placed.items():
         point = placed.root.positions(ask.object_mesh)[0] @ moved[:3, :3].T + moved[:3, 3]
@@ -159,19 +161,26 @@ def test_placing_does_not_depend_on_where_the_object_has_its_origin() -> None:
 
 
 def test_pads_out_of_reach_are_left_out_and_named_with_their_distance() -> None:
-    ask = request({"approach": [0, 0, 1], "without": ["thumb*"], "far": 0.02})
-    result = FromPose().place(ask)
+    ask = request()
+    result = FromPose(approach=UPWARD, without=("thumb*",), far=0.02).place(ask)
+    asked = FromPose(approach=UPWARD, without=("thumb*",)).place(replace(ask, reach=0.02))
+    assert asked.left_out == result.left_out  # the request's reach goes before the placer's own
     assert set(result.placed) | set(result.left_out) == set(ask.patch_axes)
     assert result.left_out and all("% of the length away" in why for why in result.left_out.values())
     with pytest.raises(InvalidInput, match="leaves out every part"):
-        FromPose().place(request({"approach": [0, 0, 1], "without": ["*"]}))
+        FromPose(approach=UPWARD, without=("*",)).place(ask)
 
 
 def test_the_naive_placer_leaves_the_fingers_open() -> None:
-    result = Naive().place(request({"approach": [0, 0, 1], "without": ["thumb*"]}))
+    result = Naive(approach=UPWARD, without=("thumb*",)).place(request())
     rig = job().rig
     assert result.pose is not None
     inner = rig.parents >= 0
     np.testing.assert_allclose(result.pose.local[inner], rig.rest_local[inner], atol=1e-12)
-    with pytest.raises(InvalidInput, match="'close'"):
-        Naive().place(request({"close": ["index*"]}))
+
+
+@pytest.mark.parametrize("placer", [FromPose(), Naive()])
+def test_placers_declare_their_settings(placer: FromPose | Naive) -> None:
+    check_settings(placer)
+    with pytest.raises(InvalidInput, match="a direction"):
+        replace(placer, approach=(0.0, 0.0, 0.0))

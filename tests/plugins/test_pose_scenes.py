@@ -14,7 +14,6 @@ from contact_builtins.solvers.stepwise import ProgressiveSolver, StagedSolver
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.rig.rig import skin
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
-from contact_core.solve.solver import SolveOptions
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +45,7 @@ def test_the_tentacle_wraps_the_pole(scenes: ModuleType) -> None:
 @pytest.mark.slow
 def test_the_body_sits_down_by_stages(scenes: ModuleType) -> None:
     problem = scenes.chair().problem
-    solution = StagedSolver().solve(problem, SolveOptions(more={"stages": scenes.STAGES}))
+    solution = StagedSolver(scenes.STAGES).solve(problem)
     length = problem.manipulator_length
     for name, patch in solution.patches.items():
         assert patch.mean < 0.013 * length, name

@@ -39,11 +39,7 @@ class TestProgressive(SolverContract):
 class TestMultiStart(SolverContract):
     @pytest.fixture
     def solver(self) -> PoseSolver:
-        return MultiStartSolver()
-
-    @pytest.fixture
-    def options(self) -> SolveOptions:
-        return SolveOptions(more={"starts": 4})
+        return MultiStartSolver(starts=4)
 
 
 class TestNLopt(SolverContract):
@@ -66,11 +62,7 @@ class TestNLoptPaper(SolverContract):
     @pytest.fixture
     def solver(self) -> PoseSolver:
         pytest.importorskip("nlopt")
-        return NLoptSolver()
-
-    @pytest.fixture
-    def options(self) -> SolveOptions:
-        return SolveOptions(more={"preset": "paper"})
+        return NLoptSolver(preset="paper")
 
 
 JUDGED = {

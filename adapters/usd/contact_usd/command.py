@@ -31,7 +31,7 @@ class UsdCommand:
         transfer.add_argument("source", type=Path)
         solve = actions.add_parser("solve", help="solve the contact pairs of shots and key the poses")
         solve.add_argument("--frames", type=_frames, metavar="1,5,10-20", help="time codes; without, no key is set")
-        solve.add_argument("--solver", default="levenberg-marquardt", metavar="NAME")
+        solve.add_argument("--solver", metavar="NAME")
         for action in (transfer, solve):
             action.add_argument("shots", nargs="+", type=Path, metavar="SHOT")
             action.add_argument(
@@ -156,7 +156,8 @@ def _solve(arguments: argparse.Namespace) -> int:
 
     plugins, wanted = arguments.plugins, dict(arguments.surface)
     solver = arguments.solver
-    plugins.get(POSE_SOLVERS, solver)  # before the first shot, an unknown name is refused
+    if solver is not None:
+        plugins.get(POSE_SOLVERS, solver)  # before the first shot, an unknown name is refused
 
     def work(path: Path, out: Path | None, part: Progress) -> dict[str, object]:
         return shots.solve(path, arguments.frames, solver, wanted, out, part, plugins)

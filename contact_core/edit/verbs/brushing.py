@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from contact_core.arrays import BoolArray
@@ -11,13 +13,14 @@ from contact_core.edit.verbs.painting import PaintingVerbs
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.settings import configured
 
 
 class BrushVerbs(PaintingVerbs):
     """Paint and erase with brushes."""
 
-    def named_brush(self, name: str) -> Brush:
-        """A brush by name; a session asks its plugins."""
+    def named_brush(self, name: str, **settings: Any) -> Brush:
+        """A brush by name, with its settings; a session asks its plugins."""
         raise InvalidInput(
             f"only a session knows brushes by name: ask its named_brush({name!r}) before, and pass what it answers."
         )
@@ -31,14 +34,18 @@ class BrushVerbs(PaintingVerbs):
         axis: SurfacePoints | None = None,
         generator: str | None = None,
         color: Color | None = None,
+        **settings: Any,
     ) -> int:
         """Paint a patch with a brush, or erase from it where the brush erases; all gestures are one step.
 
         brush: a name, or the brush itself; within a stroke, where no plugin is looked for, only that. surface,
         axis, generator, color: of a new patch, as for `paint`. Erased is what lies nearer to a point of a mark,
-        over the surface, than the mark's points lie apart.
+        over the surface, than the mark's points lie apart. settings: of the brush, such as falloff="smooth".
         """
-        tool = self.named_brush(brush) if isinstance(brush, str) else brush
+        if isinstance(brush, str):
+            tool = self.named_brush(brush, **settings)
+        else:
+            tool = configured(brush, settings, f"the brush {brush.name!r}")
         where = self.document.patches[patch].surface if patch in self.document.patches else surface
         if where is None:
             raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")

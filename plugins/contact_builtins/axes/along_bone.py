@@ -15,6 +15,7 @@ class AlongBone:
 
     name = "along_bone"
     summary = "along the bone that owns most of the patch, from its head to its tail"
+    default_for = "recipe"  # whose patches lie on fingers
 
     def generate(self, request: AxisRequest) -> SurfacePoints:
         flat = flatten(request)

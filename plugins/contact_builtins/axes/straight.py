@@ -24,10 +24,7 @@ class Flattened:
 
 
 def require(request: AxisRequest, count: int = 2) -> FloatArray:
-    """(n, 3) positions of the patch. Raises InvalidInput when fewer than `count` of them are apart, and for
-    settings, of which no built-in generator has any."""
-    if request.options:
-        raise InvalidInput(f"this generator has no settings, but {', '.join(map(repr, request.options))} came.")
+    """(n, 3) positions of the patch. Raises InvalidInput when fewer than `count` of them are apart."""
     positions = request.points.positions(request.mesh)
     apart = len(np.unique(np.round(positions / max(request.mesh.bounding_box_diagonal, 1e-300), 9), axis=0))
     if apart < count:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
@@ -17,21 +19,23 @@ from contact_core.geometry.raycast import Locator
 _ROUNDS = 14  # halvings of the parameter step: 2^-14 of a segment tells a silhouette from a steep slope
 
 
+@dataclass(frozen=True)
 class CurveBrush:
     """A cubic B-spline through the control points. The step between points is in surface units; where the curve
-    leaves the surface, or jumps over a silhouette, it is cut. Option `starts`: indices at which further strokes
-    begin.
+    leaves the surface, or jumps over a silhouette, it is cut. starts: indices of control points at which further
+    strokes begin.
 
     Without screen positions the spline goes through the path in space and drops onto the surface."""
 
-    name = "curve"
-    summary = "equal steps along a spline drawn in screen space (the paper's)"
-    erases = False
+    name: ClassVar[str] = "curve"
+    summary: ClassVar[str] = "equal steps along a spline drawn in screen space (the paper's)"
+    erases: ClassVar[bool] = False
+    starts: tuple[int, ...] = ()
 
     def mark(self, gesture: BrushGesture) -> BrushMark:
         step = spacing_of(gesture, radius_of(gesture))
         controls, project = _drawing(gesture)
-        starts = sorted({0, *(int(start) for start in gesture.options.get("starts", ())), len(controls)})
+        starts = sorted({0, *self.starts, len(controls)})
         strokes = (controls[first:last] for first, last in itertools.pairwise(starts))
         drawn = SurfacePoints.concatenate(_stepped(gesture, stroke, project, step) for stroke in strokes)
         if not len(drawn):

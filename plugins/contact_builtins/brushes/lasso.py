@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
 from contact_builtins.brushes.sampling import darts, near_pieces, spacing_of, stroke_line, thinned
@@ -9,18 +12,20 @@ from contact_core.arrays import BoolArray, ComplexArray, FloatArray
 from contact_core.contact.brush import BrushGesture, BrushMark
 from contact_core.errors import InvalidInput
 from contact_core.geometry import SurfacePoints, TriangleMesh, log_map
+from contact_core.settings import HasSettings, setting
 
 
-class LassoBrush:
+@dataclass(frozen=True)
+class LassoBrush(HasSettings):
     """Inside is the side that the curve turns towards on the whole. A point is inside when it leaves its nearest
-    point of the curve to that side: no plane and no window is needed, so the curve may run round a finger.
+    point of the curve to that side: no plane and no window is needed, so the curve may run round a finger."""
 
-    Option `reach`: how deep the inside may be, surface units; half the curve's length by default, which is
-    more than a flat inside can have."""
-
-    name = "lasso"
-    summary = "fills the inside of a closed curve with even points"
-    erases = False
+    name: ClassVar[str] = "lasso"
+    summary: ClassVar[str] = "fills the inside of a closed curve with even points"
+    erases: ClassVar[bool] = False
+    reach: float | None = setting(
+        None, above=0.0, unit="surface units", help="how deep the inside may be; half the curve's length by default"
+    )
 
     def mark(self, gesture: BrushGesture) -> BrushMark:
         mesh = gesture.mesh
@@ -29,7 +34,7 @@ class LassoBrush:
         if len(at) < 3 or length <= 1e-9 * mesh.bounding_box_diagonal:
             raise InvalidInput(f"a lasso needs a closed curve of three points or more, but {len(at)} came.")
         spacing = spacing_of(gesture, 0.15 * length)
-        reach = float(gesture.options.get("reach", 0.5 * length))
+        reach = self.reach or 0.5 * length  # more than a flat inside can have
         curve = stroke_line(gesture, max(spacing, length / 200.0), closed=True)
         candidates = darts(mesh, near_pieces(mesh, curve, reach, 0.25 * reach), spacing, gesture.seed)
         candidates = candidates[_inside(mesh, curve, candidates, reach)]

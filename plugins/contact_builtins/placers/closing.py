@@ -9,20 +9,49 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from contact_builtins.placers.hand_pose import HandPose, flexion_dof
+from contact_builtins.placers.hand_pose import HandPose, flexion_dof, matching
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.plugins.slots import PlacementRequest
+from contact_core.settings import HasSettings, setting
 
 STEP = np.radians(3.0)
 LAST_RATIO = 0.7  # the last joint of a digit curls more slowly, as tendons make it
 TOUCH = 0.002  # of the bounding box diagonal of the hand: nearer than this is touching
 TURNED = 0.04  # hand lengths that a pad of the thumb is worth that looks away from the object
 OPPOSE = 0.008
+SHORTEST = 1e-30  # of an approach: what is shorter vanishes once it is squared
 FREE_UPPER = np.radians(100.0)  # for joints without limits
+
+
+@dataclass(frozen=True)
+class Approaching(HasSettings):
+    """The settings of placers that bring the hand to the object first."""
+
+    approach: tuple[float, float, float] | None = setting(
+        None,
+        low=-1e30,
+        high=1e30,
+        help="direction in rig space in which the hand moves until it touches; none: it stays where it is",
+    )
+    without: tuple[str, ...] = setting((), help="joint patterns whose skin the approach does not test")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.approach is not None and not np.linalg.norm(self.approach) > SHORTEST:
+            raise InvalidInput(f"the approach is a direction, but got {list(self.approach)}, which has no length.")
+
+    def approached(self, request: PlacementRequest) -> HandPose:
+        """The request's hand after its approach. Raises InvalidInput when it passes the object by."""
+        hand = HandPose(request)
+        if self.approach is not None:
+            approach(hand, np.array(self.approach), matching(request.rig, self.without, "placer.without"))
+        return hand
 
 
 def approach(hand: HandPose, direction: FloatArray, without: IntArray) -> None:

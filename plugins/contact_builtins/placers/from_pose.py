@@ -1,57 +1,61 @@
 """`place = "from pose"`: contacts go where the pads of a coarsely closed hand look.
 
-Settings (recipe table [placer], beside `name`):
-  approach = [x, y, z]        direction in rig space in which the hand moves until it touches; left out: no approach
-  without = ["thumb*"]        joints whose skin the approach does not test
-  close = ["index*", ...]     one digit per pattern, curled until it touches
-  thumb = "thumb*"            the digit that is searched over starts of its first joint
-  oppose = 0.008              how many lengths of distance it is worth that the thumb opposes the fingers
-  far = 0.06                  pads farther away than this, in manipulator lengths, are left out and named
+Its settings are what the recipe's table [placer] holds beside `name`.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
-from contact_builtins.placers.closing import OPPOSE, approach, close, search_thumb
+from contact_builtins.placers.closing import OPPOSE, Approaching, close, search_thumb
 from contact_builtins.placers.hand_pose import HandPose, dominant_joint, matching
 from contact_builtins.placers.pads import Pad, pads_of, place_pad
 from contact_core.arrays import IntArray
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job.table import Table
 from contact_core.plugins.slots import PatchPlacement, PlacementRequest, PlacementResult
+from contact_core.settings import setting
 from contact_core.solve.body import manipulator_length
 
 FACING = -0.3  # n.n' of a face that a pad may land on: never the far wall of a cup
 
 
-class FromPose:
+@dataclass(frozen=True)
+class FromPose(Approaching):
     """Approach, auto-close, thumb search, then each pad to the closest point among faces that face it."""
 
-    name = "from pose"
+    name: ClassVar[str] = "from pose"
+    summary: ClassVar[str] = "where the pads of a coarsely closed hand look"
+    default_for: ClassVar[tuple[str, ...]] = ("settle", "recipe")
+    close: tuple[str, ...] = setting((), help="joint patterns, one for each digit that is curled until it touches")
+    thumb: str | None = setting(
+        None, help="joint pattern of the digit that is searched over starts of its first joint"
+    )
+    oppose: float = setting(
+        OPPOSE,
+        low=0.0,
+        unit="manipulator lengths",
+        help="the distance it is worth that the thumb opposes the fingers",
+    )
+    far: float = setting(
+        0.06, above=0.0, unit="manipulator lengths", help="pads farther away than this are left out and named"
+    )
 
     def place(self, request: PlacementRequest) -> PlacementResult:
-        """Raises InvalidInput for wrong settings, and when the hand cannot reach the object."""
-        options = Table(dict(request.options), "placer")
-        direction = options.vector("approach", None, direction=True)
-        without = options.texts("without", ())
-        digits = options.texts("close", ())
-        thumb = options.text("thumb", None)
-        far = options.number("far", 0.06, above=0.0)
-        oppose = options.number("oppose", OPPOSE, at_least=0.0)
-        options.done()
-        hand = HandPose(request)
+        """Raises InvalidInput for settings that do not fit the rig, and when the hand cannot reach the object."""
+        hand = self.approached(request)
         rig = request.rig
-        if direction is not None:
-            approach(hand, np.array(direction), matching(rig, without, "placer.without"))
-        for pattern in digits:
+        for pattern in self.close:
             close(hand, matching(rig, (pattern,), "placer.close"))
-        if thumb is not None:
-            joints = matching(rig, (thumb,), "placer.thumb")
+        if self.thumb is not None:
+            joints = matching(rig, (self.thumb,), "placer.thumb")
             mine, others = _pads_on_and_off(request, joints, dominant_joint(rig))
-            search_thumb(hand, joints, mine, others, oppose)
-        return place_pads(request, hand, far * manipulator_length(rig), facing=FACING)
+            search_thumb(hand, joints, mine, others, self.oppose)
+        reach = self.far if request.reach is None else request.reach
+        return place_pads(request, hand, reach * manipulator_length(rig), facing=FACING)
 
 
 def place_pads(request: PlacementRequest, hand: HandPose, reach: float, facing: float | None) -> PlacementResult:

@@ -2,40 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import Cancelled, InvalidInput, MissingExtra
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.candidates import starting_thetas
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, Run, SolveOptions, SolveStatus, unsolvable
 from contact_core.solve.threads import one_blas_thread
 
 
-class NLoptSolver:
+@dataclass(frozen=True)
+class NLoptSolver(HasSettings):
     """One NLopt descent from the best starting candidate.
 
-    Settings (`SolveOptions.more`): algorithm, any NLopt name (LD_LBFGS by default); preset "paper": the unsquared
-    form, LD_MMA, xtol_rel 1e-4, 100 evaluations, from the current pose, as in the authors' later tool; give the
-    problem limits="paper" for 0..2 pi as well. max_iterations counts evaluations. Translations are divided by
-    the manipulator's length, without which L-BFGS rarely arrives.
+    The preset "paper" is the unsquared form, LD_MMA, xtol_rel 1e-4, 100 evaluations, from the current pose, as in
+    the authors' later tool; give the problem limits="paper" for 0..2 pi as well. max_iterations counts evaluations.
+    Translations are divided by the manipulator's length, without which L-BFGS rarely arrives.
     """
 
-    name = "nlopt"
-    summary = "NLopt with the algorithm of your choice; slower than the default, for comparison."
+    name: ClassVar[str] = "nlopt"
+    summary: ClassVar[str] = "NLopt with the algorithm of your choice; slower than the default, for comparison."
+    algorithm: str | None = setting(
+        None, help="the name of a local algorithm of NLopt; by default LD_LBFGS, with the paper's preset LD_MMA"
+    )
+    preset: Literal["none", "paper"] = setting("none", help="the optimiser and its limits as the paper had them")
 
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         nlopt = _nlopt()
         options = options or SolveOptions(max_iterations=2000)
-        options.check_settings(self.name, ("algorithm", "preset"))
-        algorithm, paper = _settings(nlopt, options)
+        paper = self.preset == "paper"
+        algorithm = _known(nlopt, self.algorithm or ("LD_MMA" if paper else "LD_LBFGS"))
         if paper:
             problem = replace(problem, form="paper")
             options = replace(options, candidates=("current",), max_iterations=min(options.max_iterations, 100))
@@ -99,15 +104,12 @@ def _endings(nlopt: ModuleType) -> tuple[type[Exception], ...]:
     return (RuntimeError, ValueError, *(getattr(nlopt, name) for name in names if hasattr(nlopt, name)))
 
 
-def _settings(nlopt: ModuleType, options: SolveOptions) -> tuple[str, bool]:
-    preset = options.more.get("preset", "")
-    if preset not in ("", "paper"):
-        raise InvalidInput(f'the nlopt solver has the preset "paper", but {preset!r} came.')
-    algorithm = str(options.more.get("algorithm", "LD_MMA" if preset else "LD_LBFGS"))
+def _known(nlopt: ModuleType, algorithm: str) -> str:
+    """The name of an algorithm that NLopt has. Raises InvalidInput that lists those."""
     known = [name for name in dir(nlopt) if name.startswith(("LD_", "LN_"))]
     if algorithm not in known:
         raise InvalidInput(f"NLopt has no local algorithm {algorithm!r}; it has {', '.join(known)}.")
-    return algorithm, preset == "paper"
+    return algorithm
 
 
 def _nlopt() -> Any:

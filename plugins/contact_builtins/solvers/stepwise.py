@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.errors import Cancelled, InvalidInput
+from contact_core.errors import Cancelled
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.candidates import fitted
 from contact_core.solve.levenberg_marquardt import Descent, LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
@@ -17,47 +20,46 @@ from contact_core.solve.stages import Stage, solve_stages
 from contact_core.solve.threads import one_blas_thread
 
 
+@dataclass(frozen=True)
 class StagedSolver:
     """The paper's chair: root first, then legs and feet, then arms.
 
-    Setting `stages` (`SolveOptions.more`): a list of `Stage`s or tables with free, contacts, prior, name. Without
-    it: the roots alone on all contacts, then everything.
+    stages: `Stage`s or tables with free, contacts, prior, name. Without them: the roots alone on all contacts, then
+    everything.
     """
 
-    name = "staged"
-    summary = "Levenberg-Marquardt in stages, each with its own free joints, contacts and prior."
+    name: ClassVar[str] = "staged"
+    summary: ClassVar[str] = "Levenberg-Marquardt in stages, each with its own free joints, contacts and prior."
+    stages: Sequence[Stage | Mapping[str, Any]] = ()
 
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
-        options.check_settings(self.name, ("stages",))
-        given = options.more.get("stages")
-        if given is not None and not isinstance(given, (list, tuple)):
-            raise InvalidInput(f"the setting stages is a list of stages, but {type(given).__name__} came.")
-        stages = [Stage.parse(stage) for stage in given] if given else [roots_first(problem), Stage(name="all")]
-        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, replace(options, more={}), progress)
+        given = [Stage.parse(stage) for stage in self.stages]
+        stages = given or [roots_first(problem), Stage(name="all")]
+        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, options, progress)
 
 
-class ProgressiveSolver:
-    """For wraps: contacts join one by one along the chain that carries them, so a tail follows its head.
+@dataclass(frozen=True)
+class ProgressiveSolver(HasSettings):
+    """For wraps: contacts join one by one along the chain that carries them, so a tail follows its head."""
 
-    Setting `steps`: how many times contacts are added (by default one joint at a time).
-    """
-
-    name = "progressive"
-    summary = "Levenberg-Marquardt with contacts added along the chain; for tentacles and long wraps."
+    name: ClassVar[str] = "progressive"
+    summary: ClassVar[str] = (
+        "Levenberg-Marquardt with contacts added along the chain; for tentacles and long wraps."
+    )
+    steps: int | None = setting(
+        None, low=1, high=10_000, help="how many times contacts are added; one joint at a time by default"
+    )
 
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
-        options.check_settings(self.name, ("steps",))
         depths = {contact.name: carrier_depths(problem, contact.name) for contact in problem.contacts}
         levels = np.unique(np.concatenate(list(depths.values()))) if depths else np.zeros(1, np.int64)
-        steps = int(options.more.get("steps", len(levels)))
-        if steps < 1:
-            raise InvalidInput(f"the setting steps is at least 1, but {steps} came.")
+        steps = len(levels) if self.steps is None else self.steps
         ends = (
             levels[np.unique(np.linspace(0, len(levels) - 1, steps + 1).astype(int)[1:])]
             if steps > 1
@@ -70,37 +72,41 @@ class ProgressiveSolver:
             )
             for end in ends
         ]
-        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, replace(options, more={}), progress)
+        return solve_stages(self.name, LevenbergMarquardt(), problem, stages, options, progress)
 
 
-class MultiStartSolver:
+@dataclass(frozen=True)
+class MultiStartSolver(HasSettings):
     """Many seeded starts: the pose as it is, then random placements and poses anywhere within the limits.
 
     Two of three are then brought to their contacts by a rigid fit, with normals and without; the third stays where
-    it fell. Setting `starts`: how many (32 by default), each with the iterations of `max_iterations`.
+    it fell.
     """
 
-    name = "multi-start"
-    summary = "Levenberg-Marquardt from many random starts; the best known objective, for benchmarks."
+    name: ClassVar[str] = "multi-start"
+    summary: ClassVar[str] = (
+        "Levenberg-Marquardt from many random starts; the best known objective, for benchmarks."
+    )
+    starts: int = setting(
+        32, low=1, high=100_000, help="how many starts, each with the iterations of max_iterations"
+    )
 
     def solve(
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions()
-        options.check_settings(self.name, ("starts",))
         with one_blas_thread():
             return self._solve(problem, options, progress)
 
     def _solve(self, problem: PoseProblem, options: SolveOptions, progress: Progress) -> PoseSolution:
-        starts = int(options.more.get("starts", 32))
-        run = Run(self.name, problem, options, progress, budget=starts * options.max_iterations)
+        run = Run(self.name, problem, options, progress, budget=self.starts * options.max_iterations)
         stopped = unsolvable(run)
         if stopped is not None:
             return stopped
         random = np.random.default_rng(options.seed)
         status, best = SolveStatus.STOPPED, np.inf
         try:
-            for number in range(starts):
+            for number in range(self.starts):
                 theta = problem.start if number == 0 else random_start(problem, random)
                 placed = fitted(problem, theta, with_normals=number % 3 == 1) if number % 3 else None
                 descent = Descent(run, theta if placed is None else placed, options.tolerance)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.rig.skinning import Track, joint_track
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.state import PoseState
 from contact_core.solve.terms import BoundTerm, LeastSquares
 
@@ -40,11 +41,12 @@ class Look:
 
 
 @dataclass(frozen=True)
-class PinTerm:
+class PinTerm(HasSettings):
     """Mean over the pins of (distance / l)^2."""
 
+    summary: ClassVar[str] = "points of joints come to their targets"
     pins: tuple[Pin, ...] = ()
-    weight: float = 1.0
+    weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "pin"
 
     def bind(self, problem: PoseProblem) -> BoundTerm:
@@ -69,11 +71,12 @@ class _Pins(LeastSquares):
 
 
 @dataclass(frozen=True)
-class LookTerm:
+class LookTerm(HasSettings):
     """Mean over the looks of 1 - cosine between the axis and the direction to the target."""
 
+    summary: ClassVar[str] = "axes of joints point at their targets"
     looks: tuple[Look, ...] = ()
-    weight: float = 1.0
+    weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "look"
 
     def bind(self, problem: PoseProblem) -> BoundTerm:

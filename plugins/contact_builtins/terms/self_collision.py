@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.rig.capsules import closest_on_segments, fit_capsules
 from contact_core.rig.skinning import Track, joint_track
+from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.state import PoseState
 from contact_core.solve.terms import BoundTerm, LeastSquares
@@ -20,10 +21,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class SelfCollisionTerm:
+class SelfCollisionTerm(HasSettings):
     """Mean over a body's capsules of (depth / l)^2, summed over pairs that are apart at rest."""
 
-    weight: float = 5.0
+    summary: ClassVar[str] = "parts of one body stay out of each other"
+    weight: float = setting(5.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "self-collision"
 
     def bind(self, problem: PoseProblem) -> BoundTerm:

@@ -246,14 +246,14 @@ REFUSALS: dict[str, tuple[Any, str]] = {
         "stands upright on the object",
     ),
     "settings that a generator has not": (
-        lambda r: _patched(r, generator_options={"bend": 3}), "has no settings, but 'bend' came"
+        lambda r: _patched(r, generator_options={"bend": 3}), "has no setting 'bend'; its settings: none"
     ),
     "nothing near": (
         lambda r: replace(r, placer_options={**r.placer_options, "far": 1e-9}), "the hand is not near the object"
     ),
     "an unknown solver": (lambda r: replace(r, solve=replace(r.solve, solver="guess")), "there is no pose solver"),
     "a wrong solver setting": (
-        lambda r: replace(r, solve=replace(r.solve, options={"candidates": ["luck"]})), "candidates are some of"
+        lambda r: replace(r, solve=replace(r.solve, options={"candidates": ["luck"]})), "candidates is one of"
     ),
 }  # fmt: skip
 

@@ -48,7 +48,7 @@ def test_a_recipe_says_what_it_says() -> None:
     assert [patch.name for patch in recipe.patches] == ["index-tip pad", "thumb-tip pad", "palm"]
     tip, _, palm = recipe.patches
     assert tip.disk is not None and tip.disk.at.joint == "index-tip" and tip.disk.at.along == 0.6
-    assert tip.disk.count == 40 and tip.generator == "along_bone" and tip.place is None
+    assert tip.disk.count == 40 and tip.generator is None and tip.place is None
     assert palm.vertices == (1, 2, 3) and palm.axis[1].position == (0.0, 0.0, 1.0)
     assert palm.place is not None and palm.place.aim is not None and palm.place.root.vertex == 7
     assert recipe.manipulator.sha256 is not None and recipe.manipulator.sha256.startswith("bc67")

@@ -5,20 +5,34 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
+import contact_builtins
 from contact_core.errors import InvalidInput
 from contact_core.plugins import hookimpl
 from contact_core.plugins.manager import PluginManager, PluginRecord
-from contact_core.plugins.registry import CLI, PLACERS, SLOTS
+from contact_core.plugins.registry import (
+    AXIS_GENERATORS,
+    BRUSHES,
+    CLI,
+    PLACERS,
+    POSE_SOLVERS,
+    POSE_TERMS,
+    SLOTS,
+)
+from contact_core.settings import HasSettings, setting
+from contact_core.solve.penetration import PenetrationTerm
 
 
 class Named:
     """A sound placer."""
+
+    summary = "does nothing at all"
 
     def __init__(self, name: str, replaces: str | tuple[str, ...] = ()) -> None:
         self.name = name
@@ -68,6 +82,7 @@ OFFER = """
 from contact_core.plugins import hookimpl
 class Mine:
     name = "mine"
+    summary = "a sound placer"
     def place(self, request): return request
 """
 
@@ -84,7 +99,10 @@ BROKEN = {
         OFFER + "@hookimpl\ndef contact_placers(): return 7\n",
         "must return an iterable, but returned int",
     ),
-    "wrong_type": (OFFER + "@hookimpl\ndef contact_placers(): return [object()]\n", "has no name; has no place()"),
+    "wrong_type": (
+        OFFER + "@hookimpl\ndef contact_placers(): return [object()]\n",
+        "has no name; has no summary; has no place()",
+    ),
     "unnamed": (OFFER + "Mine.name = ''\n@hookimpl\ndef contact_placers(): return [Mine]\n", "a non-empty string"),
     "signature": (
         OFFER + "Mine.place = lambda self: 0\n@hookimpl\ndef contact_placers(): return [Mine]\n",
@@ -398,3 +416,83 @@ def test_the_built_ins_have_no_problem_and_fill_every_slot_that_is_theirs() -> N
     assert record.origin == "built-in" and record.problems == []
     wanted = {slot.noun for slot in SLOTS if not slot.core} - {"host"}
     assert wanted <= {noun for each in manager.records() if each.origin == "built-in" for noun in each.offers}
+
+
+@dataclass(frozen=True)
+class Reaching(HasSettings):
+    """A placer with a setting."""
+
+    name: ClassVar[str] = "reaching"
+    summary: ClassVar[str] = "goes as far as told"
+    default_for: ClassVar[str] = "settle"
+    reach: float = setting(0.5, low=0.0, high=1.0, unit="mm", help="how far it reaches")
+
+    def place(self, request: Any) -> Any:
+        return self.reach
+
+
+def test_objects_are_made_with_checked_settings() -> None:
+    manager = PluginManager([plugin(Reaching, Named("plain"))], discover=False)
+    assert manager.make(PLACERS, "reaching", reach=1).place(None) == 1.0  # type: ignore[arg-type]
+    assert manager.get(PLACERS, "reaching") == manager.make(PLACERS, "reaching") == Reaching()
+    with pytest.raises(InvalidInput, match=r"the placer 'reaching': reach is at most 1 mm, but got 2\."):
+        manager.make(PLACERS, "reaching", reach=2)
+    with pytest.raises(InvalidInput, match=r"the placer 'plain' has no setting 'reach'; its settings: none\."):
+        manager.make(PLACERS, "plain", reach=1)
+    with pytest.raises(InvalidInput, match="no placer 'other'"):
+        manager.make(PLACERS, "other")
+    (only,) = manager.settings_of(PLACERS, "reaching")
+    assert (only.name, only.unit, only.default) == ("reach", "mm", 0.5)
+    assert manager.settings_of(PLACERS, "plain") == ()
+
+
+def test_a_term_is_made_anew_for_every_problem() -> None:
+    """The slot holds classes: nothing that is registered is taken apart to make another."""
+    manager = PluginManager([contact_builtins], discover=False)
+    one, two = (manager.make(POSE_TERMS, "penetration", weight=weight, solids={}) for weight in (1.0, 2.0))
+    assert (one.weight, two.weight) == (1.0, 2.0) and manager.get(POSE_TERMS, "penetration") is PenetrationTerm
+    with pytest.raises(InvalidInput, match="'penetration': weight is at least 0"):
+        manager.make(POSE_TERMS, "penetration", weight=-1.0)
+    with pytest.raises(InvalidInput, match="an object where a class is wanted"):
+        PluginManager(discover=False).register(_Terms())
+
+
+class _Terms:
+    @hookimpl
+    def contact_pose_terms(self) -> list[object]:
+        return [PenetrationTerm()]
+
+
+def test_the_core_asks_for_roles_and_names_no_plugin() -> None:
+    class Heir(Reaching):
+        name: ClassVar[str] = "heir"
+
+    manager = PluginManager([plugin(Named("first"), Reaching, Heir)], discover=False)
+    assert manager.name_for(PLACERS, "settle") == "reaching"  # what Reaching says is not said by its heirs
+    assert manager.name_for(PLACERS, "settle", "first") == "first"
+    with pytest.raises(InvalidInput, match="no placer is the default for 'recipe': name one; there are: first"):
+        manager.name_for(PLACERS, "recipe")
+    manager.register(plugin(Mine := dataclass(frozen=True)(type("Mine", (Reaching,), MINE)), name="studio"))
+    assert manager.name_for(PLACERS, "settle") == "mine" and manager.get(PLACERS, "mine") == Mine()
+    with pytest.raises(InvalidInput, match="default_for 'lunch'; a placer may be that for: settle, recipe"):
+        manager.register(plugin(type("Odd", (Reaching,), {"name": "odd", "default_for": "lunch"}), name="odd"))
+
+
+MINE = {"name": "mine", "default_for": "settle", "__annotations__": {}}
+
+
+def test_what_takes_a_place_takes_its_role() -> None:
+    manager = PluginManager([plugin(Reaching)], discover=False)
+    manager.register(plugin(Named("better", replaces="reaching"), name="studio"))
+    assert manager.get(PLACERS, manager.name_for(PLACERS, "settle")).name == "better"
+
+
+def test_every_built_in_has_a_summary_and_sound_settings() -> None:
+    manager = PluginManager(environ={})
+    for slot in (BRUSHES, AXIS_GENERATORS, PLACERS, POSE_SOLVERS, POSE_TERMS):
+        for name, made in manager.offers(slot).items():
+            assert len(made.summary.split()) >= 3, (slot.noun, name)
+            for each in manager.settings_of(slot, name):
+                assert len(each.help.split()) >= 3 and each.checked(each.default) == each.default
+        for role in slot.roles:
+            assert manager.name_for(slot, role) in manager.offers(slot)

@@ -18,7 +18,6 @@ class LBFGSB:
         self, problem: PoseProblem, options: SolveOptions | None = None, progress: Progress = NO_PROGRESS
     ) -> PoseSolution:
         options = options or SolveOptions(max_iterations=2000)
-        options.check_settings(self.name)
         run = Run(self.name, problem, options, progress)
         stopped = unsolvable(run)
         if stopped is not None:
