@@ -234,7 +234,13 @@ def _kind_of(owner: type, name: str) -> tuple[Kind, tuple[str, ...], bool]:
     data may name what is imported for type checkers alone."""
     base = next(each for each in owner.__mro__ if name in vars(each).get("__annotations__", {}))
     alone = type("_", (), {"__annotations__": {name: base.__annotations__[name]}, "__module__": base.__module__})
-    annotation = typing.get_type_hints(alone)[name]
+    try:
+        annotation = typing.get_type_hints(alone)[name]
+    except NameError as error:
+        raise InvalidInput(
+            f"the setting {name!r} of {owner.__name__} is annotated {base.__annotations__[name]}, but its module"
+            f" knows no {error.name!r} while it runs."
+        ) from error
     optional = False
     if typing.get_origin(annotation) in (Union, types.UnionType):
         optional = type(None) in typing.get_args(annotation)

@@ -65,6 +65,7 @@ def _mutants(path: Path) -> dict[str, type[Mutant]]:
     if spec is None or spec.loader is None:
         raise InvalidInput(f"{path} is no Python file.")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look up the module of their annotations
     spec.loader.exec_module(module)
     found: dict[str, type[Mutant]] = {
         value.subject: value
