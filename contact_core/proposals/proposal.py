@@ -64,19 +64,19 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class SolveSettings:
-    """How to solve. solver: a name; None leaves the choice to the plugins. solver_settings: its own. objective: terms,
-    limits, what is free.
+    """How to solve. solver: a name; None leaves the choice to the plugins. objective: terms, limits, what is free.
+    solver_settings: the solver's own.
 
     solids: closed meshes by surface, in its space, whose inside is out of bounds; by default each surface that
     does not bend is its own. Give filled bodies of what is hollow.
     """
 
     solver: str | None = None
-    solver_settings: Mapping[str, Any] = field(default_factory=dict)
     options: SolveOptions | None = None
     objective: Objective = field(default_factory=Objective)
     progress: Progress = NO_PROGRESS
     solids: Solids | None = None
+    solver_settings: Mapping[str, Any] = field(default_factory=dict)
 
     def solver_of(self, plugins: PluginManager) -> PoseSolver:
         """The solver; the core's own where no plugin offers any."""

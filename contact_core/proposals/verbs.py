@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.edit.verbs import SurfaceVerbs, Verbs
 from contact_core.errors import CommandRejected
@@ -62,6 +62,7 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
         *,
         frames: Sequence[float] | None = None,
         solver: str | None = None,
+        solver_settings: Mapping[str, Any] | None = None,
         terms: Iterable[str | PoseTerm] | None = None,
         free: Mapping[str, Iterable[str]] | None = None,
         held: Mapping[str, Iterable[str]] | None = None,
@@ -75,9 +76,10 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
         """Propose the pose that brings all pairs together, from where things stand in the scene now.
 
         frames: solve and, when accepted, key at these frames, rising; None is the scene as it stands, not keyed.
-        solver: a name; None leaves the choice to the plugins. terms: terms, or names of registered ones that are
-        added to the paper's three; the paper's by default. free, held: joints or single dofs by surface that may
-        move, and that may not. prior: what the prior pulls to. pairs: names of those that count; all by default.
+        solver: a name; None leaves the choice to the plugins. solver_settings: its own.
+        terms: terms, or names of registered ones that are added to the paper's three; the paper's by default.
+        free, held: joints or single dofs by surface that may move, and that may not. prior: what the prior pulls
+        to. pairs: names of those that count; all by default.
         settings: all that comes before it but the frames, in one value. Nothing is committed:
         `accept` does that. Where it is cancelled, what was best so far is proposed, with the
         status CANCELLED. Raises InvalidInput without a pair of a rig that can be posed.
@@ -88,7 +90,8 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
         if settings is None:
             chosen = None if pairs is None else self._known_pairs(tuple(pairs))
             objective = Objective(self._terms(terms), limits, free, held, prior, chosen)
-            settings = SolveSettings(solver, options, objective, progress)
+            own = dict(solver_settings or {})
+            settings = SolveSettings(solver, options, objective, progress, solver_settings=own)
         if frames is None:
             found = solve(self.document, self._draft(), self.plugins, self.revision, settings)
         else:
@@ -169,7 +172,7 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
 
         asked = list(terms or ())
         values = tuple(term for term in asked if not isinstance(term, str))
-        named = tuple(self.plugins.get(POSE_TERMS, term) for term in asked if isinstance(term, str))
+        named = tuple(self.plugins.make(POSE_TERMS, term) for term in asked if isinstance(term, str))
         return (values or paper_terms()) + named
 
     def _known_pairs(self, names: tuple[str, ...]) -> tuple[str, ...]:
