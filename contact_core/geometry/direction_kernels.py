@@ -6,6 +6,7 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import kernel
+from contact_core.geometry.kernel_arrays import Halfedges, Points
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -14,7 +15,7 @@ from contact_core.geometry.tangent_kernels import (
     corner_angle,
     corner_at_angle,
     norm,
-    place,
+    place_of,
     turned,
     vertex_scale,
 )
@@ -69,40 +70,33 @@ def in_space(h: int, x: float, y: float, points: FloatArray, faces: IntArray, di
 def headings_of_directions(
     points: FloatArray,
     faces: IntArray,
-    at_faces: IntArray,
-    at_barycentric: FloatArray,
+    at: Points,
     directions: FloatArray,
-    tail: IntArray,
-    twin: IntArray,
-    shape: FloatArray,
-    first: IntArray,
-    angle_sum: FloatArray,
-    kind: IntArray,
     headings: FloatArray,
+    mesh: Halfedges,
 ) -> int:
     """Write headings (k, 2) of directions (k, 3) at points: see `tangent.direction_to_heading`. Returns -1, or
     a halfedge of a face without three corners that a point lies in."""
-    for i in range(len(at_faces)):
+    for i in range(len(at.faces)):
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        b = at_barycentric[i]
-        on, element, _, _ = place(at_faces[i], b[0], b[1], b[2], tail, twin, shape)
+        on, element, _, _ = place_of(at, i, mesh)
         if on == ON_NOTHING:
             return element
         if on == ON_FACE:
             x, y, _ = in_frame(3 * element, dx, dy, dz, points, faces)
         elif on == ON_EDGE:
             x, y, _ = in_frame(element, dx, dy, dz, points, faces)
-            if twin[element] >= 0:
-                _, beyond, _ = in_frame(twin[element], dx, dy, dz, points, faces)
+            if mesh.twin[element] >= 0:
+                _, beyond, _ = in_frame(mesh.twin[element], dx, dy, dz, points, faces)
                 y = y if y >= beyond else -beyond
             else:
                 y = max(y, 0.0)
         else:
             least, angle = math.inf, 0.0
-            h = first[element]
+            h = mesh.first[element]
             while True:
                 x, y, z = in_frame(h, dx, dy, dz, points, faces)
-                corner = corner_angle(h, shape)
+                corner = corner_angle(h, mesh)
                 half = 0.5 * corner
                 u, v = turned(x, y, math.cos(half), -math.sin(half))
                 alpha = half + min(max(math.atan2(v, u), -half), half)
@@ -110,11 +104,11 @@ def headings_of_directions(
                 along, across = turned(x, y, math.cos(alpha), -math.sin(alpha))
                 miss = norm(across, z) if along > 0.0 else norm(norm(across, z), along) - along
                 if miss < least:
-                    least, angle = miss, shape[h, 3] + alpha
-                h = twin[preceding(h)]
-                if h < 0 or h == first[element]:
+                    least, angle = miss, mesh.shape[h, 3] + alpha
+                h = mesh.twin[preceding(h)]
+                if h < 0 or h == mesh.first[element]:
                     break
-            angle *= vertex_scale(element, angle_sum, kind)
+            angle *= vertex_scale(element, mesh)
             x, y = math.cos(angle), math.sin(angle)
         length = math.hypot(x, y)
         headings[i, 0], headings[i, 1] = (x / length, y / length) if length > 0.0 else (1.0, 0.0)
@@ -125,36 +119,29 @@ def headings_of_directions(
 def directions_of_headings(
     points: FloatArray,
     faces: IntArray,
-    at_faces: IntArray,
-    at_barycentric: FloatArray,
+    at: Points,
     headings: FloatArray,
-    tail: IntArray,
-    twin: IntArray,
-    shape: FloatArray,
-    first: IntArray,
-    angle_sum: FloatArray,
-    kind: IntArray,
     directions: FloatArray,
+    mesh: Halfedges,
 ) -> int:
     """Write directions (k, 3) of headings (k, 2) at points: see `tangent.heading_to_direction`. Returns -1, or
     a halfedge of a face without three corners that a point lies in."""
-    for i in range(len(at_faces)):
+    for i in range(len(at.faces)):
         x, y = headings[i, 0], headings[i, 1]
-        b = at_barycentric[i]
-        on, element, _, _ = place(at_faces[i], b[0], b[1], b[2], tail, twin, shape)
+        on, element, _, _ = place_of(at, i, mesh)
         if on == ON_NOTHING:
             return element
         if on == ON_FACE:
             h = 3 * element
         elif on == ON_EDGE:
             h = element
-            if y < 0.0 and twin[h] >= 0:
-                h, x, y = twin[h], -x, -y
+            if y < 0.0 and mesh.twin[h] >= 0:
+                h, x, y = mesh.twin[h], -x, -y
         else:
             angle = math.atan2(y, x)
-            if angle < 0.0 and kind[element] != BOUNDARY_VERTEX:
+            if angle < 0.0 and mesh.kind[element] != BOUNDARY_VERTEX:
                 angle += 2.0 * PI
-            h, angle = corner_at_angle(element, angle / vertex_scale(element, angle_sum, kind), twin, shape, first)
+            h, angle = corner_at_angle(element, angle / vertex_scale(element, mesh), mesh)
             x, y = math.cos(angle), math.sin(angle)
         in_space(h, x, y, points, faces, directions[i])
     return -1

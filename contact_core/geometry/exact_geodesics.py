@@ -13,6 +13,7 @@ import numpy as np
 
 from contact_core.arrays import ComplexArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.kernel_arrays import Points, plain
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
@@ -89,7 +90,7 @@ def log_map(
     is not.
     """
     from contact_core.geometry import log_map_kernels as kernels
-    from contact_core.geometry.way_kernels import read_chains, read_targets
+    from contact_core.geometry.path_kernels import read_chains, read_targets
 
     limit = _limit(max_distance)
     topology = Topology.of(mesh)
@@ -100,17 +101,14 @@ def log_map(
     count = len(targets)
     anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
     distance, headings = np.empty(count), np.empty(count, np.complex128)
-    target_floats, target_integers = np.empty((count, 12)), np.empty((count, 7), np.int64)
-    tail, twin, shape = topology.tail, topology.twin, topology.shape
-    first, angle_sum, kind = topology.first, topology.angle_sum, topology.kind
+    halfedges, starts, ends = plain(topology.halfedges), plain(sources.arrays), plain(targets.arrays)
     with Workspace.lent(mesh) as work:
+        records = plain(work.targets(count))
         while True:
+            labels = plain(work.labels)
             status, element = kernels.search(
-                sources.faces, sources.barycentric, targets.faces, targets.barycentric, limit, work.epoch,
-                tail, twin, shape, first, angle_sum, kind,
-                work.reach, work.leg, work.origin, work.claim, work.listed,
-                work.floats, work.integers, work.keys, work.items, work.state, target_floats, target_integers,
-            )  # fmt: skip
+                starts, ends, limit, halfedges, labels, plain(work.windows), plain(work.queue), records
+            )
             if status != kernels.NO_ROOM:
                 break
             work.grow()
@@ -119,16 +117,14 @@ def log_map(
         if status == kernels.MET_BLOCKED_VERTEX:
             raise topology.refuse_vertex(element, "a log map")
         bends = read_targets(
-            limit, work.epoch, tail, twin, shape, first, angle_sum, kind, work.reach, work.leg, work.origin,
-            target_floats, target_integers, _NO_FACES, _NO_BARYCENTRIC,
-            anchor, distance, headings.view(np.float64).reshape(-1, 2), offsets,
+            limit, anchor, distance, headings.view(np.float64).reshape(-1, 2), offsets,
+            halfedges, labels, records, _NO_LINE,
         )  # fmt: skip
         first_leg = np.empty(count, np.complex128)
         turning_angles, lengths = np.empty(bends), np.empty(bends)
         read_chains(
-            sources.faces, sources.barycentric, tail, twin, shape, angle_sum, kind, work.leg, work.origin,
-            target_floats, target_integers, anchor, offsets,
-            first_leg.view(np.float64).reshape(-1, 2), turning_angles, lengths,
+            starts, anchor, offsets, first_leg.view(np.float64).reshape(-1, 2), turning_angles, lengths,
+            halfedges, labels, records,
         )  # fmt: skip
         pops = work.pops
     coordinates = first_leg
@@ -164,8 +160,7 @@ def parallel_transport(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoi
     return exact_geodesic(mesh, start, end).transport(vectors)
 
 
-_NO_FACES: IntArray = np.empty(0, np.int64)  # no polyline is wanted
-_NO_BARYCENTRIC: FloatArray = np.empty((0, 3))
+_NO_LINE = plain(Points(np.empty(0, np.int64), np.empty((0, 3))))  # no polyline is asked for
 
 
 def _limit(max_distance: float | None) -> float:

@@ -32,7 +32,7 @@ _kernels: set[int] = set()  # ids of our dispatchers: other people's kernels com
 
 # numba's cache asks whether a kernel's own file changed, but not whether the kernels that it calls did: machine
 # code compiled from older helpers would live on after an upgrade. So every kernel carries the stamp of them all.
-_files = [path.stat() for path in sorted(Path(__file__).parent.glob("*_kernels.py"))]
+_files = [path.stat() for path in sorted(Path(__file__).parent.glob("*kernel*.py"))]
 _stamp = (max(file.st_mtime for file in _files), sum(file.st_size for file in _files))
 
 

@@ -12,69 +12,67 @@ that all nearer windows go before it.
 
 from __future__ import annotations
 
-from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, inlined
+from contact_core.geometry.kernel_arrays import Queue
 
 # Entries of state
-HEAP_SIZE, STACK_SIZE, FREE, USED, POPS, WINDOWS, OVERFLOW = (
-    constant(0), constant(1), constant(2), constant(3), constant(4), constant(5), constant(6),
-)  # fmt: skip
+HEAP_SIZE, STACK_SIZE, FREE, USED, POPS, WINDOWS, OVERFLOW = (constant(i) for i in range(7))
 
 
 @inlined
-def heap_push(key: float, item: int, keys: FloatArray, items: IntArray, state: IntArray) -> None:
+def heap_push(key: float, item: int, queue: Queue) -> None:
     """Insert into the min-heap, four children a node; sets OVERFLOW when it is full."""
-    i = state[HEAP_SIZE]
-    if i + state[STACK_SIZE] >= len(items) - 1:
-        state[OVERFLOW] = 1
+    i = queue.state[HEAP_SIZE]
+    if i + queue.state[STACK_SIZE] >= len(queue.items) - 1:
+        queue.state[OVERFLOW] = 1
         return
-    state[HEAP_SIZE] = i + 1
+    queue.state[HEAP_SIZE] = i + 1
     while i > 0:
         parent = (i - 1) >> 2
-        if keys[parent] <= key:
+        if queue.keys[parent] <= key:
             break
-        keys[i], items[i] = keys[parent], items[parent]
+        queue.keys[i], queue.items[i] = queue.keys[parent], queue.items[parent]
         i = parent
-    keys[i], items[i] = key, item
+    queue.keys[i], queue.items[i] = key, item
 
 
 @inlined
-def heap_pop(keys: FloatArray, items: IntArray, state: IntArray) -> int:
+def heap_pop(queue: Queue) -> int:
     """Remove the item of the smallest key."""
-    top = items[0]
-    size = state[HEAP_SIZE] - 1
-    state[HEAP_SIZE] = size
-    key, item = keys[size], items[size]
+    top = queue.items[0]
+    size = queue.state[HEAP_SIZE] - 1
+    queue.state[HEAP_SIZE] = size
+    key, item = queue.keys[size], queue.items[size]
     i = 0
     while True:
         child = 4 * i + 1
         if child >= size:
             break
-        least, last = keys[child], min(child + 4, size)
+        least, last = queue.keys[child], min(child + 4, size)
         for other in range(child + 1, last):
-            if keys[other] < least:
-                child, least = other, keys[other]
+            if queue.keys[other] < least:
+                child, least = other, queue.keys[other]
         if least >= key:
             break
-        keys[i], items[i] = least, items[child]
+        queue.keys[i], queue.items[i] = least, queue.items[child]
         i = child
-    keys[i], items[i] = key, item
+    queue.keys[i], queue.items[i] = key, item
     return top
 
 
 @inlined
-def stack_push(item: int, items: IntArray, state: IntArray) -> None:
+def stack_push(item: int, queue: Queue) -> None:
     """Put a window on the stack, which grows from the end of the heap's memory; sets OVERFLOW when they meet."""
-    if state[HEAP_SIZE] + state[STACK_SIZE] >= len(items) - 1:
-        state[OVERFLOW] = 1
+    if queue.state[HEAP_SIZE] + queue.state[STACK_SIZE] >= len(queue.items) - 1:
+        queue.state[OVERFLOW] = 1
         return
-    state[STACK_SIZE] += 1
-    items[len(items) - state[STACK_SIZE]] = item
+    queue.state[STACK_SIZE] += 1
+    queue.items[len(queue.items) - queue.state[STACK_SIZE]] = item
 
 
 @inlined
-def stack_pop(items: IntArray, state: IntArray) -> int:
+def stack_pop(queue: Queue) -> int:
     """Remove the item that came last."""
-    item = items[len(items) - state[STACK_SIZE]]
-    state[STACK_SIZE] -= 1
+    item = queue.items[len(queue.items) - queue.state[STACK_SIZE]]
+    queue.state[STACK_SIZE] -= 1
     return item

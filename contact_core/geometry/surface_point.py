@@ -9,6 +9,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput
+from contact_core.geometry.kernel_arrays import Points
 from contact_core.geometry.mesh import TriangleMesh
 
 
@@ -49,6 +50,11 @@ class SurfacePoints:
         """A sub-batch; an integer gives a batch of one."""
         faces, barycentric = self.faces[index], self.barycentric[index]
         return SurfacePoints.trusted(np.atleast_1d(faces), np.atleast_2d(barycentric))
+
+    @property
+    def arrays(self) -> Points:
+        """Both arrays in one group, as kernels take them."""
+        return Points(self.faces, self.barycentric)
 
     def __repr__(self) -> str:
         return f"SurfacePoints({len(self)} points)"

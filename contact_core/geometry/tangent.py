@@ -33,9 +33,8 @@ def direction_to_heading(mesh: TriangleMesh, points: SurfacePoints, directions: 
     require_on_surface(topology, points, "points")
     headings = np.empty(len(points), np.complex128)
     blocked = headings_of_directions(
-        mesh.points, mesh.faces, points.faces, points.barycentric, wanted,
-        topology.tail, topology.twin, topology.shape, topology.first, topology.angle_sum, topology.kind,
-        headings.view(np.float64).reshape(-1, 2),
+        mesh.points, mesh.faces, points.arrays, wanted,
+        headings.view(np.float64).reshape(-1, 2), topology.halfedges,
     )  # fmt: skip
     if blocked >= 0:
         raise topology.refuse_halfedge(blocked, "a tangent frame")
@@ -55,9 +54,8 @@ def heading_to_direction(mesh: TriangleMesh, points: SurfacePoints, headings: An
     require_on_surface(topology, points, "points")
     directions = np.empty((len(points), 3))
     blocked = directions_of_headings(
-        mesh.points, mesh.faces, points.faces, points.barycentric, wanted.view(np.float64).reshape(-1, 2),
-        topology.tail, topology.twin, topology.shape, topology.first, topology.angle_sum, topology.kind,
-        directions,
+        mesh.points, mesh.faces, points.arrays, wanted.view(np.float64).reshape(-1, 2),
+        directions, topology.halfedges,
     )  # fmt: skip
     if blocked >= 0:
         raise topology.refuse_halfedge(blocked, "a tangent frame")

@@ -22,6 +22,7 @@ from contact_core.geometry.elements import (
     UNUSED_VERTEX,
 )
 from contact_core.geometry.flat_faces import mollify
+from contact_core.geometry.kernel_arrays import Halfedges
 from contact_core.geometry.mesh import TriangleMesh
 
 
@@ -85,6 +86,11 @@ class Topology:
         for array in (twin, shape, first, angle_sum, kind):
             array.setflags(write=False)
         return cls(tail, twin, shape, first, angle_sum, kind)
+
+    @property
+    def halfedges(self) -> Halfedges:
+        """The arrays in one group, as kernels take them."""
+        return Halfedges(self.tail, self.twin, self.shape, self.first, self.angle_sum, self.kind)
 
     @property
     def is_manifold(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from contact_core.arrays import ComplexArray, FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput
+from contact_core.geometry.kernel_arrays import Points, plain
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
@@ -86,19 +87,18 @@ def trace_chains(
         raise InvalidInput(
             f"a chain has one turning angle for each length, but {len(turning_angles)} and {len(lengths)} came."
         )
-    faces, barycentric = np.empty(count, np.int64), np.empty((count, 3))
+    ends = Points(np.empty(count, np.int64), np.empty((count, 3)))
     headings, remaining = np.empty(count, np.complex128), np.empty(count)
     order = np.argsort(starts.faces, kind="stable") if count >= _WORTH_SORTING else np.arange(count)
     room = 64 * (count + len(lengths)) if polyline else 0
     while True:
-        line_faces, line_barycentric = np.empty(room, np.int64), np.empty((room, 3))
+        line = Points(np.empty(room, np.int64), np.empty((room, 3)))
         line_ends = np.zeros((count, 2), np.int64)
         status, where, element = trace(
-            starts.faces, starts.barycentric, first_leg.view(np.float64).reshape(-1, 2),
+            plain(starts.arrays), first_leg.view(np.float64).reshape(-1, 2),
             offsets, turning_angles, lengths,
-            topology.tail, topology.twin, topology.shape, topology.first, topology.angle_sum, topology.kind,
-            faces, barycentric, headings.view(np.float64).reshape(-1, 2), remaining,
-            line_faces, line_barycentric, line_ends, order,
+            plain(ends), headings.view(np.float64).reshape(-1, 2), remaining, line_ends, order,
+            plain(topology.halfedges), plain(line),
         )  # fmt: skip
         if status != NO_ROOM:
             break
@@ -107,9 +107,9 @@ def trace_chains(
         raise _refusal(topology, status, where, element)
     lines = None
     if polyline:
-        way = SurfacePoints.trusted(line_faces[:where], line_barycentric[:where])
+        way = SurfacePoints.trusted(line.faces[:where], line.barycentric[:where])
         lines = Polylines(way, _read_only(line_ends[:, 0]), _read_only(line_ends[:, 1]))
-    return Trace(SurfacePoints.trusted(faces, barycentric), _read_only(headings), _read_only(remaining), lines)
+    return Trace(SurfacePoints.trusted(*ends), _read_only(headings), _read_only(remaining), lines)
 
 
 _NO_OFFSETS: Any = object()

@@ -11,6 +11,7 @@ import math
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.kernel_arrays import Halfedges, Points
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
     ON_FACE,
@@ -24,6 +25,7 @@ from contact_core.geometry.tangent_kernels import (
     direction_of_next,
     heading_at,
     place,
+    place_of,
     turned,
     turned_back,
     vertex_scale,
@@ -52,43 +54,41 @@ JOINT = 1e-9
 
 
 @inlined
-def start_on_edge(
-    h: int, x: float, dx: float, dy: float, twin: IntArray, shape: FloatArray
-) -> tuple[int, float, float, float]:
+def start_on_edge(h: int, x: float, dx: float, dy: float, mesh: Halfedges) -> tuple[int, float, float, float]:
     """Where a walk from an edge point begins: (halfedge of the face it enters or a negative twin, x, dx, dy)."""
     if dy >= 0.0:
         return h, x, dx, dy
-    other = twin[h]
+    other = mesh.twin[h]
     if other == BOUNDARY and dy > -GRAZE:
         return h, x, dx, 0.0
-    return other, shape[h, 0] - x, -dx, -dy
+    return other, mesh.shape[h, 0] - x, -dx, -dy
 
 
 @inlined
 def start_in_face(
-    f: int, x: float, y: float, dx: float, dy: float, shape: FloatArray
+    f: int, x: float, y: float, dx: float, dy: float, mesh: Halfedges
 ) -> tuple[int, float, float, float, float]:
     """A walk from inside face f, moved to the frame of a halfedge that it does not leave through."""
     h = 3 * f
-    length = shape[h, 0]
+    length = mesh.shape[h, 0]
     tail_side = dx * (0.0 - y) - dy * (0.0 - x)  # positive: the corner lies left of the ray
     head_side = dx * (0.0 - y) - dy * (length - x)
     if not (tail_side < 0.0 <= head_side):
         return h, x, y, dx, dy
-    ux, uy = direction_of_next(h, shape)
+    ux, uy = direction_of_next(h, mesh)
     x, y = turned_back(x - length, y, ux, uy)
     dx, dy = turned_back(dx, dy, ux, uy)
     return h + 1, x, y, dx, dy
 
 
 @inlined
-def onward_angle(v: int, back: float, angle_sum: FloatArray, kind: IntArray) -> float:
+def onward_angle(v: int, back: float, mesh: Halfedges) -> float:
     """The angle at which a straight walk leaves vertex v that it reached from angle `back`; negative: nowhere.
 
     On a boundary straight on means half a turn of the rescaled frame: only a walk along the rim goes on.
     """
-    total = angle_sum[v]
-    if kind[v] == BOUNDARY_VERTEX:
+    total = mesh.angle_sum[v]
+    if mesh.kind[v] == BOUNDARY_VERTEX:
         if back < GRAZE:
             return total
         return 0.0 if back > total - GRAZE else -1.0
@@ -97,22 +97,22 @@ def onward_angle(v: int, back: float, angle_sum: FloatArray, kind: IntArray) -> 
 
 
 @inlined
-def record(
-    h: int, fraction_head: float, fraction_apex: float, faces: IntArray, barycentric: FloatArray, i: int
-) -> None:
+def record(h: int, fraction_head: float, fraction_apex: float, points: Points, i: int) -> None:
     """Write a point of the face of h, given by its weights at the head and the apex of h, as row i."""
     k = h % 3
-    faces[i] = h // 3
-    barycentric[i, k] = max(1.0 - fraction_head - fraction_apex, 0.0)
-    barycentric[i, (k + 1) % 3] = fraction_head
-    barycentric[i, (k + 2) % 3] = fraction_apex
+    points.faces[i] = h // 3
+    points.barycentric[i, k] = max(1.0 - fraction_head - fraction_apex, 0.0)
+    points.barycentric[i, (k + 1) % 3] = fraction_head
+    points.barycentric[i, (k + 2) % 3] = fraction_apex
 
 
 @inlined
-def append(f: int, b0: float, b1: float, b2: float, faces: IntArray, barycentric: FloatArray, end: int) -> int:
-    """Append a surface point to buffers that may be full; returns the new end, beyond the buffers if they were."""
-    if end < len(faces):
-        faces[end], barycentric[end, 0], barycentric[end, 1], barycentric[end, 2] = f, b0, b1, b2
+def append(points: Points, i: int, line: Points, end: int) -> int:
+    """Append row i of points to a buffer that may be full; returns the new end, beyond the buffer if it was."""
+    if end < len(line.faces):
+        line.faces[end] = points.faces[i]
+        for k in range(3):
+            line.barycentric[end, k] = points.barycentric[i, k]
     return end + 1
 
 
@@ -126,15 +126,9 @@ def walk(
     zy: float,
     to_joint: bool,
     to_bend: bool,
-    tail: IntArray,
-    twin: IntArray,
-    shape: FloatArray,
-    first: IntArray,
-    angle_sum: FloatArray,
-    kind: IntArray,
-    line_faces: IntArray,
-    line_barycentric: FloatArray,
     line_end: int,
+    mesh: Halfedges,
+    line: Points,
 ) -> tuple[int, int, float, float, float, float, float, int]:
     """Walk straight from a place along the tangent vector (zx, zy), not zero.
 
@@ -150,9 +144,9 @@ def walk(
     dx, dy = zx / remaining, zy / remaining
     h, vertex, angle, miss = -1, -1, 0.0, 0.0
     if on == ON_FACE:
-        h, x, y, dx, dy = start_in_face(element, x, y, dx, dy, shape)
+        h, x, y, dx, dy = start_in_face(element, x, y, dx, dy, mesh)
     elif on == ON_EDGE:
-        h, x, dx, dy = start_on_edge(element, x, dx, dy, twin, shape)
+        h, x, dx, dy = start_on_edge(element, x, dx, dy, mesh)
         if h == BLOCKED:
             return MET_BLOCKED_EDGE, element, x, y, dx, dy, remaining, line_end
         if h == BOUNDARY:
@@ -160,30 +154,30 @@ def walk(
     else:
         vertex = element
         angle = math.atan2(dy, dx)
-        if angle < -GRAZE or (angle < 0.0 and kind[vertex] != BOUNDARY_VERTEX):
+        if angle < -GRAZE or (angle < 0.0 and mesh.kind[vertex] != BOUNDARY_VERTEX):
             angle += 2.0 * PI
-        if kind[vertex] == BOUNDARY_VERTEX and angle > PI + GRAZE:
+        if mesh.kind[vertex] == BOUNDARY_VERTEX and angle > PI + GRAZE:
             return DONE, -1, x, y, dx, dy, remaining, line_end
-        angle /= vertex_scale(vertex, angle_sum, kind)
+        angle /= vertex_scale(vertex, mesh)
 
     for _ in range(MOST_CROSSINGS):
         from_vertex = vertex >= 0
         if from_vertex:
-            if kind[vertex] == BLOCKED_VERTEX:
+            if mesh.kind[vertex] == BLOCKED_VERTEX:
                 return MET_BLOCKED_VERTEX, vertex, x, y, dx, dy, remaining, line_end
-            h, angle = corner_at_angle(vertex, angle, twin, shape, first)
+            h, angle = corner_at_angle(vertex, angle, mesh)
             x, y, dx, dy = 0.0, 0.0, math.cos(angle), math.sin(angle)
             vertex = -1
-        length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+        length, ax, ay = mesh.shape[h, 0], mesh.shape[h, 1], mesh.shape[h, 2]
         side = dx * (ay - y) - dy * (ax - x)
         right = from_vertex or side > 0.0 or (side == 0.0 and ay == 0.0 and dx > 0.0)  # along a flat face: ahead
         if right:  # through the edge from the head to the apex
             edge, ox = following(h), length
-            size = shape[edge, 0]
-            ux, uy = direction_of_next(h, shape)
-        else:  # through the edge from the tail to the apex
+            size = mesh.shape[edge, 0]
+            ux, uy = direction_of_next(h, mesh)
+        else:  # through the edge from the mesh.tail to the apex
             edge, ox = preceding(h), 0.0
-            size = shape[edge, 0]
+            size = mesh.shape[edge, 0]
             ux, uy = ax / size, ay / size
         near = MEETING * size if to_bend else SNAP * size
         across = dx * uy - dy * ux
@@ -192,7 +186,9 @@ def walk(
         else:
             inverse = 1.0 / across
             step = max(((ox - x) * uy + y * ux) * inverse, 0.0)
-            along = min(max(((ox - x) * dy + y * dx) * inverse, 0.0), size)  # from the tail or head to the apex
+            along = min(
+                max(((ox - x) * dy + y * dx) * inverse, 0.0), size
+            )  # from the mesh.tail or head to the apex
         at_vertex, arrival = along <= near or size - along <= near, near
         if at_vertex:  # the way to the vertex, not to where the ray leaves beside it
             along = 0.0 if along <= near else size
@@ -204,33 +200,33 @@ def walk(
             step = min(step, remaining)
             return DONE, h, x + step * dx, y + step * dy, dx, dy, 0.0, line_end
         remaining -= step
-        if len(line_faces) > 0:
-            if line_end >= len(line_faces):
+        if len(line.faces) > 0:
+            if line_end >= len(line.faces):
                 return NO_ROOM, h, x, y, dx, dy, remaining, line_end
             t = along / size
-            record(h, 1.0 - t if right else 0.0, t, line_faces, line_barycentric, line_end)
+            record(h, 1.0 - t if right else 0.0, t, line, line_end)
             line_end += 1
         x, y = ox + along * ux, along * uy
         if at_vertex:
             if along == size:
                 corner = preceding(h)
-                bx, by = turned_back(dx, dy, ax / shape[corner, 0], ay / shape[corner, 0])
+                bx, by = turned_back(dx, dy, ax / mesh.shape[corner, 0], ay / mesh.shape[corner, 0])
             elif right:
                 corner = edge
                 bx, by = turned_back(-dx, -dy, ux, uy)
             else:
                 corner = h
                 bx, by = -dx, -dy
-            vertex = tail[corner]
-            if to_bend and bends_paths(vertex, angle_sum, kind):
+            vertex = mesh.tail[corner]
+            if to_bend and bends_paths(vertex, mesh):
                 return MET_BEND, corner, miss, 0.0, bx, by, remaining, line_end
-            if kind[vertex] == BLOCKED_VERTEX:
+            if mesh.kind[vertex] == BLOCKED_VERTEX:
                 return MET_BLOCKED_VERTEX, vertex, x, y, dx, dy, remaining, line_end
-            angle = onward_angle(vertex, angle_round_vertex(corner, bx, by, shape), angle_sum, kind)
+            angle = onward_angle(vertex, angle_round_vertex(corner, bx, by, mesh), mesh)
             if angle < 0.0:
                 return DONE, h, x, y, dx, dy, remaining, line_end
             continue
-        other = twin[edge]
+        other = mesh.twin[edge]
         if other < 0:
             status = DONE if other == BOUNDARY else MET_BLOCKED_EDGE
             if to_joint and remaining <= JOINT * size:
@@ -246,156 +242,138 @@ def walk(
 
 
 @inlined
-def corner_near(h: int, x: float, y: float, part: float, shape: FloatArray) -> int:
+def corner_near(h: int, x: float, y: float, part: float, mesh: Halfedges) -> int:
     """The corner, by its halfedge, that (x, y) in the frame of h lies within a part of an edge of; -1 if none."""
-    length, near = shape[h, 0], part * max(shape[h, 0], shape[following(h), 0])
+    length, near = mesh.shape[h, 0], part * max(mesh.shape[h, 0], mesh.shape[following(h), 0])
     if y <= near:
         if abs(x) <= near:
             return h
         if abs(x - length) <= near:
             return following(h)
-    return preceding(h) if abs(x - shape[h, 1]) <= near and abs(y - shape[h, 2]) <= near else -1
+    return preceding(h) if abs(x - mesh.shape[h, 1]) <= near and abs(y - mesh.shape[h, 2]) <= near else -1
 
 
 @inlined
-def moved_into_face(h: int, x: float, y: float, shape: FloatArray) -> tuple[float, float]:
+def moved_into_face(h: int, x: float, y: float, mesh: Halfedges) -> tuple[float, float]:
     """(x, y) in the frame of h, or the nearest point of the edge that rounding put it beyond. (To clip barycentric
     coordinates instead would move it a million times as far, near the corner of a sliver.)"""
-    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
+    length, ax, ay = mesh.shape[h, 0], mesh.shape[h, 1], mesh.shape[h, 2]
     if ax * y > ay * x:
-        left_length = shape[preceding(h), 0]
+        left_length = mesh.shape[preceding(h), 0]
         ux, uy = ax / left_length, ay / left_length
         t = min(max(x * ux + y * uy, 0.0), left_length)
         x, y = t * ux, t * uy
-    rx, ry = -shape[following(h), 1], shape[following(h), 2]  # along the edge on the right, times the length
+    rx, ry = (
+        -mesh.shape[following(h), 1],
+        mesh.shape[following(h), 2],
+    )  # along the edge on the right, times the length
     if rx * y < ry * (x - length):
         ux, uy = rx / length, ry / length
-        t = min(max((x - length) * ux + y * uy, 0.0), shape[following(h), 0])
+        t = min(max((x - length) * ux + y * uy, 0.0), mesh.shape[following(h), 0])
         x, y = length + t * ux, t * uy
     return x, max(y, 0.0)
 
 
 @inlined
 def settle(
-    h: int,
-    x: float,
-    y: float,
-    is_joint: bool,
-    tail: IntArray,
-    twin: IntArray,
-    shape: FloatArray,
-    faces: IntArray,
-    barycentric: FloatArray,
-    i: int,
+    h: int, x: float, y: float, is_joint: bool, points: Points, i: int, mesh: Halfedges
 ) -> tuple[int, int, float, float]:
     """Write (x, y) in the frame of h as surface point i and return its place; what lies on an edge or a vertex is
     written with exact zeros, so that whoever reads the point finds the same place."""
-    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
-    f, corner = h // 3, corner_near(h, x, y, JOINT if is_joint else SNAP, shape)
+    length, ax, ay = mesh.shape[h, 0], mesh.shape[h, 1], mesh.shape[h, 2]
+    f, corner = h // 3, corner_near(h, x, y, JOINT if is_joint else SNAP, mesh)
     if corner >= 0:
-        on, element, px, py = ON_VERTEX, tail[corner], 0.0, 0.0
-        faces[i] = f
+        on, element, px, py = ON_VERTEX, mesh.tail[corner], 0.0, 0.0
+        points.faces[i] = f
     else:
-        x, y = moved_into_face(h, x, y, shape)
+        x, y = moved_into_face(h, x, y, mesh)
         apex = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
         head = min(max((x - apex * ax) / length, 0.0), 1.0 - apex)
-        record(h, head, apex, faces, barycentric, i)
-        on, element, px, py = place(f, barycentric[i, 0], barycentric[i, 1], barycentric[i, 2], tail, twin, shape)
+        record(h, head, apex, points, i)
+        on, element, px, py = place(
+            f, points.barycentric[i, 0], points.barycentric[i, 1], points.barycentric[i, 2], mesh
+        )
     if on == ON_VERTEX:
         for k in range(3):
-            barycentric[i, k] = 1.0 if tail[3 * f + k] == element else 0.0
+            points.barycentric[i, k] = 1.0 if mesh.tail[3 * f + k] == element else 0.0
     elif on == ON_EDGE:
-        edge = element if element // 3 == f else twin[element]
+        edge = element if element // 3 == f else mesh.twin[element]
         k = edge % 3
-        t = px / shape[edge, 0]
+        t = px / mesh.shape[edge, 0]
         if edge != element:
             t = 1.0 - t
-        barycentric[i, k], barycentric[i, (k + 1) % 3], barycentric[i, (k + 2) % 3] = 1.0 - t, t, 0.0
+        points.barycentric[i, k], points.barycentric[i, (k + 1) % 3], points.barycentric[i, (k + 2) % 3] = (
+            1.0 - t,
+            t,
+            0.0,
+        )
     return on, element, px, py
 
 
 @kernel
 def trace(
-    start_faces: IntArray,
-    start_barycentric: FloatArray,
+    starts: Points,
     first_legs: FloatArray,
     offsets: IntArray,
     turning_angles: FloatArray,
     lengths: FloatArray,
-    tail: IntArray,
-    twin: IntArray,
-    shape: FloatArray,
-    first: IntArray,
-    angle_sum: FloatArray,
-    kind: IntArray,
-    faces: IntArray,
-    barycentric: FloatArray,
+    ends: Points,
     headings: FloatArray,
     remaining: FloatArray,
-    line_faces: IntArray,
-    line_barycentric: FloatArray,
     line_ends: IntArray,
     order: IntArray,
+    mesh: Halfedges,
+    line: Points,
 ) -> tuple[int, int, int]:
     """Trace k chains of straight legs; returns (status, chain, blocked element).
 
     first_legs (k, 2) tangent vectors at the starts; then, per row of offsets (k + 1,), legs that turn from straight
-    on by turning_angles and run for lengths. Writes faces (k,), barycentric (k, 3), headings (k, 2) and
+    on by turning_angles and run for lengths. Writes ends (k), headings (k, 2) and
     remaining (k,); if the line buffers have rows the crossings, start and end included, with line_ends (k, 2):
     first row, row after the last. order (k,): who walks when.
     """
-    lines = len(line_faces) > 0
+    starts = Points(*starts)
+    ends = Points(*ends)
+    mesh = Halfedges(*mesh)
+    line = Points(*line)
+    lines = len(line.faces) > 0
     cursor = 0
     for i in order:
-        f = start_faces[i]
-        b0, b1, b2 = start_barycentric[i, 0], start_barycentric[i, 1], start_barycentric[i, 2]
-        on, element, x, y = place(f, b0, b1, b2, tail, twin, shape)
+        on, element, x, y = place_of(starts, i, mesh)
         if on == ON_NOTHING:
             return MET_BLOCKED_EDGE, i, element
-        faces[i], barycentric[i, 0], barycentric[i, 1], barycentric[i, 2] = f, b0, b1, b2
+        append(starts, i, ends, i)
         zx, zy = first_legs[i, 0], first_legs[i, 1]
         rest = math.hypot(zx, zy)
         hx, hy = (1.0, 0.0) if rest < 1e-290 else (zx / rest, zy / rest)
         if lines:
             line_ends[i, 0] = cursor
-            cursor = append(f, b0, b1, b2, line_faces, line_barycentric, cursor)
+            cursor = append(ends, i, line, cursor)
         leg = offsets[i]
         while True:
             if rest >= 1e-290:
                 status, h, x, y, dx, dy, rest, cursor = walk(
-                    on, element, x, y, hx * rest, hy * rest, leg < offsets[i + 1], False,
-                    tail, twin, shape, first, angle_sum, kind, line_faces, line_barycentric, cursor,
-                )  # fmt: skip
+                    on, element, x, y, hx * rest, hy * rest, leg < offsets[i + 1], False, cursor, mesh, line
+                )
                 if status != DONE:
                     return status, i, h
                 if h >= 0:
-                    on, element, x, y = settle(
-                        h, x, y, leg < offsets[i + 1], tail, twin, shape, faces, barycentric, i
-                    )
-                    hx, hy = heading_at(on, element, h, dx, dy, tail, twin, shape, angle_sum, kind)
+                    on, element, x, y = settle(h, x, y, leg < offsets[i + 1], ends, i, mesh)
+                    hx, hy = heading_at(on, element, h, dx, dy, mesh)
             if rest > 0.0 or leg == offsets[i + 1]:
                 break
             hx, hy = turned(hx, hy, math.cos(turning_angles[leg]), math.sin(turning_angles[leg]))
             rest = lengths[leg]
             leg += 1
             if lines:  # where it bends
-                b0, b1, b2 = barycentric[i, 0], barycentric[i, 1], barycentric[i, 2]
-                cursor = append(faces[i], b0, b1, b2, line_faces, line_barycentric, cursor)
+                cursor = append(ends, i, line, cursor)
         headings[i, 0], headings[i, 1] = hx, hy
         for j in range(leg, offsets[i + 1]):
             rest += lengths[j]
         remaining[i] = rest
         if lines:
-            cursor = append(
-                faces[i],
-                barycentric[i, 0],
-                barycentric[i, 1],
-                barycentric[i, 2],
-                line_faces,
-                line_barycentric,
-                cursor,
-            )
+            cursor = append(ends, i, line, cursor)
             line_ends[i, 1] = cursor
-            if cursor > len(line_faces):
+            if cursor > len(line.faces):
                 return NO_ROOM, i, 0
     return DONE, cursor, 0

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import math
 
-from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.kernel_arrays import Halfedges, Labels, Path, Queue, Window, Windows
 from contact_core.geometry.queue_kernels import FREE, OVERFLOW, USED, WINDOWS, heap_push, stack_push
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
@@ -41,10 +41,7 @@ from contact_core.geometry.topology_kernels import (
 )
 
 # Columns of the float record of a window
-B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING, SLACK = (
-    constant(0), constant(1), constant(2), constant(3), constant(4), constant(5), constant(6), constant(7),
-    constant(8), constant(9),
-)  # fmt: skip
+B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING, SLACK = (constant(i) for i in range(10))
 # Columns of its integer record. root: source s as -1 - s, or a vertex. wedge: the halfedge in whose frame
 # directions at the root are given. side: which child of its parent it is. A free record links to the next one in
 # HALFEDGE.
@@ -58,49 +55,42 @@ GRAZING = 1e-11
 BLUR = 4e-15
 MOST_SLACK = 1e-6
 # A way so near to the rim of its window (in slacks) may meet a vertex when it is walked, for a walk meets what it
-# misses by SNAP, a thousand times more than the blur of a face. `way_kernels.bend_met` looks whether it does.
+# misses by SNAP, a thousand times more than the blur of a face. `path_kernels.bend_met` looks whether it does.
 TOUCHING = 1e3
+INSIDE = constant(0)  # of a path that does not touch the rim of its window
 SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
 
 
 @inlined
-def distance_at(v: int, epoch: float, reach: FloatArray) -> float:
+def distance_at(v: int, labels: Labels) -> float:
     """The distance found so far at vertex v."""
-    return reach[v, 1] if reach[v, 0] == epoch else math.inf
+    return labels.reach[v, 1] if labels.reach[v, 0] == labels.epoch else math.inf
 
 
 @kernel
-def lower(
-    v: int, distance: float, root: int, wedge: int, zx: float, zy: float, corner: int, bx: float, by: float,
-    touches: bool, bound: float, epoch: float, shape: FloatArray, angle_sum: FloatArray, kind: IntArray,
-    reach: FloatArray, leg: FloatArray, origin: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
-) -> None:  # fmt: skip
-    """Record a shorter way to v: last leg (zx, zy) in the wedge's frame, way back (bx, by) in the corner's, and
-    whether it touches the rim of its window."""
-    if reach[v, 0] == epoch and origin[v, 2] == 1:  # a vertex that was a root already keeps its way
+def update_vertex(v: int, path: Path, bound: float, mesh: Halfedges, labels: Labels, queue: Queue) -> None:
+    """Label v with a shorter path, and queue it as a pseudo-source if paths can bend there."""
+    reach, leg, origin = labels.reach, labels.leg, labels.origin
+    if reach[v, 0] == labels.epoch and origin[v, 2] == 1:  # its windows have left: it keeps its path
         return
-    reach[v, 0], reach[v, 1] = epoch, distance
-    leg[v, 0], leg[v, 1], leg[v, 2] = zx, zy, angle_round_vertex(corner, bx, by, shape)
-    origin[v, 0], origin[v, 1], origin[v, 2], origin[v, 3] = root, wedge, 0, 1 if touches else 0
-    if distance <= bound and bends_paths(v, angle_sum, kind):
-        heap_push(distance, -1 - v, keys, items, state)
+    reach[v, 0], reach[v, 1] = labels.epoch, path.distance
+    leg[v, 0], leg[v, 1] = path.zx, path.zy
+    leg[v, 2] = angle_round_vertex(path.halfedge, path.x, path.y, mesh)
+    origin[v, 0], origin[v, 1], origin[v, 2], origin[v, 3] = path.root, path.wedge, 0, path.touches
+    if path.distance <= bound and bends_paths(v, mesh):
+        heap_push(path.distance, -1 - v, queue)
 
 
 @inlined
-def cast(
-    edge: int, b0: float, b1: float, sx: float, sy: float, sigma: float, cos: float, sin: float,
-    root: int, wedge: int, side: int, split_distance: float, split_crossing: float, slack: float,
-    bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray, reach: FloatArray,
-    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
-) -> None:  # fmt: skip
-    """Let a window through `edge` of the face that it leaves, unless it is empty, off the surface, too far, or
-    outdone.
-
-    Interval, root position and rotation are given in the frame of the edge's other side.
-    """
-    h = twin[edge]
-    length = shape[edge, 0]
-    b0, b1, sy = max(b0, 0.0), min(b1, length), min(sy, 0.0)
+def push_window(
+    edge: int, window: Window, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue
+) -> None:
+    """Queue a window that leaves a face through `edge`, unless it is empty, off the surface, too far, or dominated
+    by a path through a vertex next to it (Xin and Wang 2009)."""
+    sx, sigma, side = window.sx, window.sigma, window.side
+    h = mesh.twin[edge]
+    length = mesh.shape[edge, 0]
+    b0, b1, sy = max(window.b0, 0.0), min(window.b1, length), min(window.sy, 0.0)
     if not b1 > b0 or h == BOUNDARY:
         return
     to_b0, to_b1 = norm(b0 - sx, sy), norm(b1 - sx, sy)
@@ -108,55 +98,54 @@ def cast(
     if key > bound:
         return
     d0, d1 = (sigma + to_b0) * SURELY, (sigma + to_b1) * SURELY
-    following_edge = following(edge)
-    left, right = tail[following_edge], tail[edge]  # the other side runs the other way
-    if distance_at(left, epoch, reach) + b1 < d1 or distance_at(right, epoch, reach) + (length - b0) < d0:
+    left, right = mesh.tail[following(edge)], mesh.tail[edge]  # the other side runs the other way
+    if distance_at(left, labels) + b1 < d1 or distance_at(right, labels) + (length - b0) < d0:
         return
     if side != ONLY_CHILD:
-        from_apex = distance_at(tail[preceding(edge)], epoch, reach)
-        x, y = length - shape[edge, 1], shape[edge, 2]
+        from_apex = distance_at(mesh.tail[preceding(edge)], labels)
+        x, y = length - mesh.shape[edge, 1], mesh.shape[edge, 2]
         if side == LEFT_CHILD:  # the third vertex of the face lies right of the window
             if from_apex + norm(b0 - x, y) < d0:
                 return
         elif from_apex + norm(b1 - x, y) < d1:
             return
-    w = state[FREE]
+    w = queue.state[FREE]
     if w >= 0:
-        state[FREE] = integers[w, HALFEDGE]
+        queue.state[FREE] = windows.integers[w, HALFEDGE]
     else:
-        w = state[USED]
-        if w >= len(integers):
-            state[OVERFLOW] = 1
+        w = queue.state[USED]
+        if w >= len(windows.integers):
+            queue.state[OVERFLOW] = 1
             return
-        state[USED] = w + 1
-    record = floats[w]
+        queue.state[USED] = w + 1
+    record = windows.floats[w]
     record[B0], record[B1], record[SX], record[SY], record[SIGMA] = b0, b1, sx, sy, sigma
-    record[COS], record[SIN], record[SLACK] = cos, sin, slack
-    record[SPLIT_DISTANCE], record[SPLIT_CROSSING] = split_distance, split_crossing
+    record[COS], record[SIN], record[SLACK] = window.cos, window.sin, window.slack
+    record[SPLIT_DISTANCE], record[SPLIT_CROSSING] = window.split_distance, window.split_crossing
     # a blocked edge waits in the heap like any other: it is refused only when the search really gets there
-    integers[w, HALFEDGE] = h if h != BLOCKED else -1 - edge
-    integers[w, ROOT], integers[w, WEDGE], integers[w, SIDE] = root, wedge, side
-    state[WINDOWS] += 1
-    if h == BLOCKED or key > keys[len(keys) - 1]:
-        heap_push(key, w, keys, items, state)
+    windows.integers[w, HALFEDGE] = h if h != BLOCKED else -1 - edge
+    windows.integers[w, ROOT], windows.integers[w, WEDGE], windows.integers[w, SIDE] = (
+        window.root,
+        window.wedge,
+        side,
+    )
+    queue.state[WINDOWS] += 1
+    if h == BLOCKED or key > queue.keys[len(queue.keys) - 1]:
+        heap_push(key, w, queue)
     else:
-        stack_push(w, items, state)
+        stack_push(w, queue)
 
 
 @inlined
-def propagate(
-    w: int, bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray,
-    angle_sum: FloatArray, kind: IntArray, reach: FloatArray, leg: FloatArray, origin: IntArray, claim: FloatArray,
-    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
-) -> None:  # fmt: skip
+def propagate(w: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue) -> None:
     """Carry window w across its face: to the apex if its cone holds it, and through the other two edges."""
-    record = floats[w]
+    record = windows.floats[w]
     b0, b1, sx, sy, sigma = record[B0], record[B1], record[SX], record[SY], record[SIGMA]
     cos, sin = record[COS], record[SIN]
-    h, root, wedge = integers[w, HALFEDGE], integers[w, ROOT], integers[w, WEDGE]
+    h, root, wedge = windows.integers[w, HALFEDGE], windows.integers[w, ROOT], windows.integers[w, WEDGE]
     to_left, to_right = preceding(h), following(h)
-    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
-    left_length, right_length = shape[to_left, 0], shape[to_right, 0]
+    length, ax, ay = mesh.shape[h, 0], mesh.shape[h, 1], mesh.shape[h, 2]
+    left_length, right_length = mesh.shape[to_left, 0], mesh.shape[to_right, 0]
     rx, ry = ax - sx, ay - sy  # from the root to the apex
     beyond_left = (b0 - sx) * ry + sy * rx  # positive: the apex lies left of the leftmost ray
     beyond_right = -((b1 - sx) * ry + sy * rx)
@@ -169,131 +158,160 @@ def propagate(
     split_distance, split_crossing = -1.0, 0.0
     left_lean, right_lean = span * slack * left_ray, span * slack * right_ray
     if beyond_left <= left_lean and beyond_right <= right_lean:
-        apex = tail[to_left]
+        apex = mesh.tail[to_left]
         distance = sigma + norm(rx, ry)
         sharp = left and right
-        if distance < distance_at(apex, epoch, reach) * SURELY:
+        if distance < distance_at(apex, labels) * SURELY:
             cx, cy = -ax / left_length, -ay / left_length
-            lower(
-                apex, distance, root, wedge, rx * cos - ry * sin, rx * sin + ry * cos,
-                to_left, -rx * cx - ry * cy, -ry * cx + rx * cy,
-                beyond_left >= -TOUCHING * left_lean or beyond_right >= -TOUCHING * right_lean,
-                bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
-            )  # fmt: skip
+            path = Path(
+                distance,
+                root,
+                wedge,
+                rx * cos - ry * sin,
+                rx * sin + ry * cos,
+                to_left,
+                -rx * cx - ry * cy,
+                -ry * cx + rx * cy,
+                1 if beyond_left >= -TOUCHING * left_lean or beyond_right >= -TOUCHING * right_lean else 0,
+            )
+            update_vertex(apex, path, bound, mesh, labels, queue)
         if sharp:  # one angle, one split
             crossing = sx - rx * sy / ry if ry > 0.0 else sx
             split_distance, split_crossing = distance, crossing
-            held, crossed = claim[h, 1], claim[h, 2]
-            if claim[h, 0] != epoch:
-                claim[h, 0], claim[h, 1], claim[h, 2], claim[h, 3], claim[h, 4] = epoch, distance, crossing, b0, b1
+            seat = windows.occupied[h]
+            occupier, crossed = seat[1], seat[2]
+            if seat[0] != labels.epoch:
+                seat[0], seat[1], seat[2], seat[3], seat[4] = labels.epoch, distance, crossing, b0, b1
             elif (
-                max(distance, held) * SURELY <= min(distance, held) and abs(crossing - crossed) <= GRAZING * length
+                max(distance, occupier) * SURELY <= min(distance, occupier)
+                and abs(crossing - crossed) <= GRAZING * length
             ):
-                # the same light again, by another way of the same length: on each side the wider window goes on
-                left, right = b0 < claim[h, 3] - GRAZING * length, b1 > claim[h, 4] + GRAZING * length
-                claim[h, 3], claim[h, 4] = min(b0, claim[h, 3]), max(b1, claim[h, 4])
-            elif distance < held:
-                claim[h, 1], claim[h, 2], claim[h, 3], claim[h, 4] = distance, crossing, b0, b1
-            elif distance * SURELY > held:
+                # the same image again, along a path of the same length: on each side the wider window goes on
+                left, right = b0 < seat[3] - GRAZING * length, b1 > seat[4] + GRAZING * length
+                seat[3], seat[4] = min(b0, seat[3]), max(b1, seat[4])
+            elif distance < occupier:
+                seat[1], seat[2], seat[3], seat[4] = distance, crossing, b0, b1
+            elif distance * SURELY > occupier:
                 left = crossing < crossed + GRAZING * length
                 right = crossing > crossed - GRAZING * length
     if left:
         ux, uy = ax / left_length, ay / left_length
         t0 = 0.0 if b0 == 0.0 else left_length * sy * b0 / (ax * sy + ay * (b0 - sx))
         t1 = left_length if beyond_right <= 0.0 else left_length * sy * b1 / (ax * sy + ay * (b1 - sx))
-        cast(
-            to_left, t0, t1, sx * ux + sy * uy, sy * ux - sx * uy, sigma, cos * ux - sin * uy, cos * uy + sin * ux,
-            root, wedge, LEFT_CHILD, split_distance, split_crossing, slack,
-            bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
-        )  # fmt: skip
+        window = Window(
+            t0,
+            t1,
+            sx * ux + sy * uy,
+            sy * ux - sx * uy,
+            sigma,
+            cos * ux - sin * uy,
+            cos * uy + sin * ux,
+            slack,
+            split_distance,
+            split_crossing,
+            root,
+            wedge,
+            LEFT_CHILD,
+        )
+        push_window(to_left, window, bound, mesh, labels, windows, queue)
     if right:  # the same, seen in a mirror that puts the head at the origin
-        ux, uy = direction_of_next(h, shape)
+        ux, uy = direction_of_next(h, mesh)
         ux, uy = -ux, -uy
         fx, fs = right_length * ux, length - sx
         c0, c1 = length - b0, length - b1
         t0 = 0.0 if beyond_left <= 0.0 else right_length - right_length * sy * c0 / (fx * sy + ay * (c0 - fs))
         t1 = right_length if c1 == 0.0 else right_length - right_length * sy * c1 / (fx * sy + ay * (c1 - fs))
-        cast(
-            to_right, t0, t1, -rx * ux - ry * uy, -ry * ux + rx * uy, sigma, cos * ux - sin * uy, cos * uy + sin *
-            ux, root, wedge, RIGHT_CHILD, split_distance, split_crossing, slack,
-            bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
-        )  # fmt: skip
+        window = Window(
+            t0,
+            t1,
+            -rx * ux - ry * uy,
+            -ry * ux + rx * uy,
+            sigma,
+            cos * ux - sin * uy,
+            cos * uy + sin * ux,
+            slack,
+            split_distance,
+            split_crossing,
+            root,
+            wedge,
+            RIGHT_CHILD,
+        )
+        push_window(to_right, window, bound, mesh, labels, windows, queue)
 
 
 @inlined
-def lost_its_claim(
-    w: int, epoch: float, twin: IntArray, claim: FloatArray, floats: FloatArray, integers: IntArray
-) -> bool:
+def is_displaced(w: int, mesh: Halfedges, labels: Labels, windows: Windows) -> bool:
     """Whether, since w was cast, a window nearer to the apex took the side of the face that w came through."""
-    split_distance = floats[w, SPLIT_DISTANCE]
+    split_distance = windows.floats[w, SPLIT_DISTANCE]
     if split_distance < 0.0:
         return False
-    edge = twin[integers[w, HALFEDGE]]
-    side = integers[w, SIDE]
+    edge = mesh.twin[windows.integers[w, HALFEDGE]]
+    side = windows.integers[w, SIDE]
     entry = following(edge) if side == LEFT_CHILD else preceding(edge)
-    if claim[entry, 1] >= split_distance * SURELY:
+    if windows.occupied[entry, 1] >= split_distance * SURELY:
         return False
-    gap = floats[w, SPLIT_CROSSING] - claim[entry, 2]
+    gap = windows.floats[w, SPLIT_CROSSING] - windows.occupied[entry, 2]
     return gap > GRAZING if side == LEFT_CHILD else gap < -GRAZING
 
 
 @kernel
-def emit_shadow(
-    v: int, bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray, first: IntArray,
-    angle_sum: FloatArray, kind: IntArray, reach: FloatArray, leg: FloatArray, origin: IntArray,
-    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
-) -> None:  # fmt: skip
+def windows_of_pseudo_source(
+    v: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue
+) -> None:
     """Cast windows from v, reached from angle leg[v, 2], into its shadow: half a turn or more off, both ways."""
-    origin[v, 2] = 1
-    sigma, back, total = reach[v, 1], leg[v, 2], angle_sum[v]
-    rim = kind[v] == BOUNDARY_VERTEX
+    labels.origin[v, 2] = 1
+    sigma, back, total = labels.reach[v, 1], labels.leg[v, 2], mesh.angle_sum[v]
+    rim = mesh.kind[v] == BOUNDARY_VERTEX
     low, high = 0.0 if rim else back + PI - total, back - PI
     low_too, high_too = back + PI, total if rim else back + total - PI
-    h = first[v]
+    h = mesh.first[v]
     while True:
         opposite, backward = following(h), preceding(h)
-        corner = corner_angle(h, shape)
+        corner = corner_angle(h, mesh)
         for reversed_edge in (False, True):
-            x, y = (shape[h, 1], shape[h, 2]) if reversed_edge else (shape[h, 0], 0.0)
+            x, y = (mesh.shape[h, 1], mesh.shape[h, 2]) if reversed_edge else (mesh.shape[h, 0], 0.0)
             arrival = backward if reversed_edge else opposite
-            neighbour = tail[arrival]
-            distance = sigma + (shape[backward, 0] if reversed_edge else shape[h, 0])
-            if distance < distance_at(neighbour, epoch, reach) * SURELY:
+            neighbour = mesh.tail[arrival]
+            distance = sigma + (mesh.shape[backward, 0] if reversed_edge else mesh.shape[h, 0])
+            if distance < distance_at(neighbour, labels) * SURELY:
                 if reversed_edge:
                     bx, by = 1.0, 0.0
                 else:
-                    ux, uy = direction_in_face(opposite, shape)
-                    vx, vy = direction_in_face(h, shape)
+                    ux, uy = direction_in_face(opposite, mesh)
+                    vx, vy = direction_in_face(h, mesh)
                     bx, by = -vx * ux - vy * uy, -vy * ux + vx * uy
-                lower(
-                    neighbour, distance, v, h, x, y, arrival, bx, by,
-                    False, bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
-                )  # fmt: skip
-        start = shape[h, 3]
+                path = Path(distance, v, h, x, y, arrival, bx, by, INSIDE)
+                update_vertex(neighbour, path, bound, mesh, labels, queue)
+        start = mesh.shape[h, 3]
         for part in range(2):
             a0 = max((low if part == 0 else low_too) - start, 0.0)
             a1 = min((high if part == 0 else high_too) - start, corner)
             if a1 > a0:
-                cast_from_corner(
-                    h, a0, a1, corner, sigma, v,
-                    bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
-                )  # fmt: skip
-        h = twin[backward]
-        if h < 0 or h == first[v]:
+                window_from_corner(h, a0, a1, corner, sigma, v, bound, mesh, labels, windows, queue)
+        h = mesh.twin[backward]
+        if h < 0 or h == mesh.first[v]:
             break
 
 
 @kernel
-def cast_from_corner(
-    h: int, a0: float, a1: float, corner: float, sigma: float, root: int,
-    bound: float, epoch: float, tail: IntArray, twin: IntArray, shape: FloatArray, reach: FloatArray,
-    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
-) -> None:  # fmt: skip
+def window_from_corner(
+    h: int,
+    a0: float,
+    a1: float,
+    corner: float,
+    sigma: float,
+    root: int,
+    bound: float,
+    mesh: Halfedges,
+    labels: Labels,
+    windows: Windows,
+    queue: Queue,
+) -> None:
     """Cast a window from the tail of h, between angles a0 < a1 from h, through the opposite edge."""
     opposite = following(h)
-    length, ax, ay = shape[h, 0], shape[h, 1], shape[h, 2]
-    size = shape[opposite, 0]
-    ux, uy = direction_of_next(h, shape)
+    length, ax, ay = mesh.shape[h, 0], mesh.shape[h, 1], mesh.shape[h, 2]
+    size = mesh.shape[opposite, 0]
+    ux, uy = direction_of_next(h, mesh)
     ux, uy = -ux, -uy
     b0, b1 = 0.0, size  # from the apex to the head
     if a0 > 0.0:
@@ -302,20 +320,25 @@ def cast_from_corner(
     if a1 < corner:
         sin, cos = math.sin(a1), math.cos(a1)
         b0 = size * (1.0 - length * sin / (cos * ay + sin * size * ux))
-    cast(
-        opposite, b0, b1, -ax * ux - ay * uy, -ay * ux + ax * uy, sigma, ux, uy,
-        root, h, ONLY_CHILD, -1.0, 0.0, GRAZING,
-        bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
-    )  # fmt: skip
+    window = Window(
+        b0, b1, -ax * ux - ay * uy, -ay * ux + ax * uy, sigma, ux, uy, GRAZING, -1.0, 0.0, root, h, ONLY_CHILD
+    )
+    push_window(opposite, window, bound, mesh, labels, windows, queue)
 
 
 @kernel
-def emit_source(
-    base: int, x: float, y: float, on: int, root: int, bound: float, epoch: float,
-    tail: IntArray, twin: IntArray, shape: FloatArray, angle_sum: FloatArray, kind: IntArray,
-    reach: FloatArray, leg: FloatArray, origin: IntArray,
-    floats: FloatArray, integers: IntArray, keys: FloatArray, items: IntArray, state: IntArray,
-) -> None:  # fmt: skip
+def windows_of_source(
+    base: int,
+    x: float,
+    y: float,
+    on: int,
+    root: int,
+    bound: float,
+    mesh: Halfedges,
+    labels: Labels,
+    windows: Windows,
+    queue: Queue,
+) -> None:
     """Light a face from the source at (x, y) in the frame of halfedge `base`: its corners, and windows out of it.
 
     on: what the source lies on; the face, `base`, or the tail of `base`. No window leaves through its own edges.
@@ -326,24 +349,22 @@ def emit_source(
     cos, sin = 1.0, 0.0  # from the frame of h to that of base
     for side in range(3):
         if side == 2 and on == ON_VERTEX:  # known better than by way of the far corner
-            x, y = shape[h, 0], 0.0
+            x, y = mesh.shape[h, 0], 0.0
         distance = norm(x, y)
-        v = tail[h]
-        if distance < distance_at(v, epoch, reach):
-            lower(
-                v, distance, root, base, corner_x - from_x, corner_y - from_y, h, x, y,
-                False, bound, epoch, shape, angle_sum, kind, reach, leg, origin, keys, items, state,
-            )  # fmt: skip
-        length = shape[h, 0]
+        v = mesh.tail[h]
+        if distance < distance_at(v, labels):
+            path = Path(distance, root, base, corner_x - from_x, corner_y - from_y, h, x, y, INSIDE)
+            update_vertex(v, path, bound, mesh, labels, queue)
+        length = mesh.shape[h, 0]
         if side == 1 or on == ON_FACE or (side == 2 and on == ON_EDGE):
-            cast(
-                h, 0.0, length, length - x, -y, 0.0, -cos, -sin, root, base, ONLY_CHILD, -1.0, 0.0, GRAZING,
-                bound, epoch, tail, twin, shape, reach, floats, integers, keys, items, state,
-            )  # fmt: skip
+            window = Window(
+                0.0, length, length - x, -y, 0.0, -cos, -sin, GRAZING, -1.0, 0.0, root, base, ONLY_CHILD
+            )
+            push_window(h, window, bound, mesh, labels, windows, queue)
         h_next = following(h)
-        ux, uy = direction_of_next(h, shape)
+        ux, uy = direction_of_next(h, mesh)
         x -= length
         x, y = x * ux + y * uy, y * ux - x * uy
         cos, sin = cos * ux - sin * uy, cos * uy + sin * ux
-        corner_x, corner_y = (shape[base, 0], 0.0) if side == 0 else (shape[base, 1], shape[base, 2])
+        corner_x, corner_y = (mesh.shape[base, 0], 0.0) if side == 0 else (mesh.shape[base, 1], mesh.shape[base, 2])
         h = h_next

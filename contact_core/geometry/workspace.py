@@ -8,52 +8,53 @@ from contextlib import contextmanager
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.kernel_arrays import Labels, Queue, Targets, Windows
 from contact_core.geometry.mesh import TriangleMesh
 
 _POPS = 4  # queue_kernels.POPS; importing that would import numba
 
 
 class Workspace:
-    """Arrays for one query at a time on a mesh of n points and m faces.
+    """Arrays for one query at a time on a mesh of n points and m faces, in the groups that kernels take.
 
     Nothing is cleared between queries: a row whose first entry is not the epoch of the query counts as empty. The
     arrays begin as untouched zero pages, so memory grows with the regions visited, not with the mesh.
-
-    reach: (n, 2) epoch, distance.  origin: (n, 4) root, wedge, 1 once the vertex is a root itself, 1 where the
-    last leg touches the rim of its window.
-    leg: (n, 3) last leg to the vertex in the root's wedge frame; angle round the vertex of the way back.
-    claim: (3m, 5) per entered halfedge: epoch, distance to the apex, where the ray to the apex crosses, interval.
-    listed: (m, 2) epoch, first target of the face.
-    floats, integers: window records, as in `window_kernels`.  keys, items, state: the queue and counters, as in
-    `queue_kernels`.
     """
 
     def __init__(self, point_count: int, face_count: int) -> None:
-        self.epoch = 0.0
-        self.reach: FloatArray = np.zeros((point_count, 2))
-        self.leg: FloatArray = np.zeros((point_count, 3))
-        self.origin: IntArray = np.zeros((point_count, 4), np.int64)
-        self.claim: FloatArray = np.zeros((3 * face_count, 5))
-        self.listed: FloatArray = np.zeros((face_count, 2))
-        self.state: IntArray = np.zeros(7, np.int64)
+        self.labels = Labels(
+            epoch=0.0,
+            reach=np.zeros((point_count, 2)),
+            leg=np.zeros((point_count, 3)),
+            origin=np.zeros((point_count, 4), np.int64),
+        )
+        self._occupied: FloatArray = np.zeros((3 * face_count, 5))
+        self._waiting: FloatArray = np.zeros((face_count, 2))
+        self._state: IntArray = np.zeros(7, np.int64)
         self.reserve(4096)
 
     def reserve(self, windows: int) -> None:
         """Make room for so many windows at once."""
-        self.floats: FloatArray = np.empty((windows, 10))
-        self.integers: IntArray = np.empty((windows, 4), np.int64)
-        self.keys: FloatArray = np.empty(2 * windows)
-        self.items: IntArray = np.empty(2 * windows, np.int64)
+        self.windows = Windows(np.empty((windows, 10)), np.empty((windows, 4), np.int64), self._occupied)
+        self.queue = Queue(np.empty(2 * windows), np.empty(2 * windows, np.int64), self._state)
+
+    def targets(self, count: int) -> Targets:
+        """Records for so many targets."""
+        return Targets(np.empty((count, 12)), np.empty((count, 7), np.int64), self._waiting)
+
+    def begin(self) -> None:
+        """A new epoch: whatever an earlier query wrote counts as empty."""
+        self.labels = self.labels._replace(epoch=self.labels.epoch + 1.0)
 
     def grow(self) -> None:
         """Four times the room, and a new epoch: the query that overflowed starts again from nothing."""
-        self.epoch += 1.0
-        self.reserve(4 * len(self.floats))
+        self.begin()
+        self.reserve(4 * len(self.windows.floats))
 
     @property
     def pops(self) -> int:
         """What the last query took from its heap."""
-        return int(self.state[_POPS])
+        return int(self.queue.state[_POPS])
 
     @classmethod
     @contextmanager
@@ -64,7 +65,7 @@ class Workspace:
             workspace = pool.pop()
         except IndexError:
             workspace = cls(len(mesh.points), len(mesh.faces))
-        workspace.epoch += 1.0
+        workspace.begin()
         try:
             yield workspace
         finally:
