@@ -76,6 +76,7 @@ class GeodesicEngine(Protocol):
     """Answers geodesic questions on any triangle mesh (hook `contact_geodesic_engines`)."""
 
     name: str
+    summary: str
     exact: bool
     tolerances: EngineTolerances
 
@@ -94,6 +95,7 @@ class ExactEngine:
     """The engine of this package: exact in the polyhedral sense, at the cost of the patch, not of the mesh."""
 
     name = "exact"
+    summary = "exact geodesics of the mesh, whatever its triangles"
     exact = True
     tolerances = EngineTolerances(distance=1e-12, trace=1e-12, round_trip=1e-8)
 

@@ -28,6 +28,7 @@ class Format(Protocol):
     """A file format (hook `contact_formats`)."""
 
     name: str  # "gltf"
+    summary: str
     suffixes: tuple[str, ...]  # (".glb", ".gltf"), lower case
     can_read: bool
     can_write: bool
@@ -59,6 +60,7 @@ class Renderer(Protocol):
     """Draws a picture off-screen (hook `contact_renderers`)."""
 
     name: str
+    summary: str
     priority: int  # the highest that is available is taken
 
     def unavailable(self) -> str | None:

@@ -10,6 +10,7 @@ from contact_core.edit.verbs import SurfaceVerbs, Verbs
 from contact_core.geometry.surface_point import SurfacePoints
 
 if TYPE_CHECKING:
+    from contact_core.contact.axis_generator import AxisGenerator
     from contact_core.contact.brush import Brush
     from contact_core.geometry.engine import GeodesicEngine
     from contact_core.plugins.manager import PluginManager
@@ -34,8 +35,10 @@ class PluginVerbs(Verbs, SurfaceVerbs):
             self._plugins = PluginManager(given, discover=discover)
         return self._plugins
 
-    def default_axis(self, surface: str, patch: str, points: SurfacePoints, generator: str | None) -> SurfacePoints:
-        """Axis points from an axis generator: the one named, or the one that the plugins choose."""
+    def default_axis(
+        self, surface: str, patch: str, points: SurfacePoints, generator: str | AxisGenerator | None
+    ) -> SurfacePoints:
+        """Axis points from an axis generator: the one given or named, or the one that the plugins choose."""
         from contact_core.plugins.registry import AXIS_GENERATORS
 
         offered = self.plugins.offers(AXIS_GENERATORS)
@@ -45,7 +48,8 @@ class PluginVerbs(Verbs, SurfaceVerbs):
             ) or self.plugins.name_for(AXIS_GENERATORS, "paint")
         if generator is None:
             return super().default_axis(surface, patch, points, generator)
-        return self.plugins.get(AXIS_GENERATORS, generator).generate(self.axis_request(surface, patch, points))
+        made = self.plugins.get(AXIS_GENERATORS, generator) if isinstance(generator, str) else generator
+        return made.generate(self.axis_request(surface, patch, points))
 
     def named_brush(self, name: str, **settings: Any) -> Brush:
         """A brush of this session's plugins. Raises InvalidInput that lists what there is, and for settings that

@@ -63,6 +63,7 @@ class HostAdapter(Protocol):
     """
 
     name: str  # "memory", "usd", "blender"
+    summary: str  # in a few words, what its scenes are
     suffixes: tuple[str, ...]  # of files that it opens, lower case: (".usda", ".usdc")
 
     @abstractmethod

@@ -59,6 +59,7 @@ class MemoryHost(
     """A scene in memory: of the file at `path`, or `scene`, or empty of `space`. Raises FileRefused."""
 
     name = "memory"
+    summary = "a scene in memory, for tests and for scripts without a host"
     suffixes = (".contactscene",)
     viewport = (1280, 720)  # pixels
 

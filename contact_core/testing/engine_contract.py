@@ -66,8 +66,9 @@ class EngineContract(Contract):
         raise AssertionError(f"{type(self).__name__} must give a fixture `engine` that returns a GeodesicEngine.")
 
     def test_e01_declares_itself(self, engine: GeodesicEngine) -> None:
-        """An engine has a name, says whether it is exact, and declares its tolerances."""
+        """An engine has a name and a summary, says whether it is exact, and declares its tolerances."""
         assert isinstance(engine, GeodesicEngine), f"{engine!r} lacks a member of GeodesicEngine"
+        assert len(engine.summary.split()) >= 3, engine.summary
         assert engine.name and isinstance(engine.exact, bool)
         assert 0 < engine.tolerances.distance < 1 and 0 < engine.tolerances.trace < 1
 

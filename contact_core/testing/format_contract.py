@@ -73,8 +73,9 @@ class FormatContract(Contract):
         return path
 
     def test_f01_is_named(self, file_format: Format) -> None:
-        """Has a name, and endings in lower case that begin with a dot; reads or writes."""
+        """Has a name and a summary, and endings in lower case that begin with a dot; reads or writes."""
         assert file_format.name == file_format.name.strip() != ""
+        assert len(file_format.summary.split()) >= 3, file_format.summary
         assert file_format.suffixes
         for suffix in file_format.suffixes:
             assert suffix.startswith(".") and suffix == suffix.lower(), suffix

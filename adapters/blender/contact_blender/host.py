@@ -71,6 +71,7 @@ class BlenderHost(
     """
 
     name = "blender"
+    summary = "the scene that is open in Blender"
     suffixes = (".blend",)
 
     def __init__(self, path: Path | str | None = None) -> None:

@@ -21,6 +21,7 @@ class UsdFiles:
     """Reads any stage; writes text and binary layers. pxr is imported when a file is read or written."""
 
     name = "usd"
+    summary = "meshes and skeletons of USD stages"
     suffixes = (".usda", ".usdc", ".usd", ".usdz")
     can_read = True
     can_write = True

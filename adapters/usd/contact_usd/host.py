@@ -51,6 +51,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
     """
 
     name = "usd"
+    summary = "a USD stage with an own layer for contacts"
     suffixes = stage_io.SUFFIXES
 
     def __init__(

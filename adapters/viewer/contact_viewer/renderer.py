@@ -31,6 +31,7 @@ class PyVistaRenderer:
     """Lit, soft-shaded pictures, off-screen (extra `viewer`)."""
 
     name = "pyvista"
+    summary = "pictures by VTK, shaded and smooth"
     priority = 100
 
     def unavailable(self) -> str | None:

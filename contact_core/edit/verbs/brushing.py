@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.arrays import BoolArray
+from contact_core.contact.axis_generator import AxisGenerator
 from contact_core.contact.brush import Brush, BrushGesture, BrushMark
 from contact_core.document.document import Color
 from contact_core.edit.verbs.painting import PaintingVerbs
@@ -32,7 +33,7 @@ class BrushVerbs(PaintingVerbs):
         *gestures: BrushGesture,
         surface: str | None = None,
         axis: SurfacePoints | None = None,
-        generator: str | None = None,
+        generator: str | AxisGenerator | None = None,
         color: Color | None = None,
         **settings: Any,
     ) -> int:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.arrays import FloatArray
+from contact_core.contact.axis_generator import AxisGenerator
 from contact_core.contact.placement import Root
 from contact_core.contact.proximity import patches_of_vertices, touching_vertices
 from contact_core.document.document import named
@@ -80,7 +81,7 @@ class GatheringVerbs(PaintingVerbs):
         other: str,
         distance: float,
         *,
-        generator: str | None = None,
+        generator: str | AxisGenerator | None = None,
         smallest: int = 3,
     ) -> tuple[str, ...]:
         """Paint each touching part as a patch: name, name.2 ...; answers the names. InvalidInput for none."""

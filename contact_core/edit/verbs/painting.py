@@ -11,6 +11,7 @@ import numpy as np
 from contact_core.arrays import FloatArray
 from contact_core.contact.area import measure_area
 from contact_core.contact.axis import Axis, draw_axis
+from contact_core.contact.axis_generator import AxisGenerator
 from contact_core.contact.patch import parameterize_patch
 from contact_core.contact.placement import Link, Placement
 from contact_core.contact.point_sets import connected_parts, without_doubles
@@ -37,7 +38,9 @@ PALETTE: tuple[Color, ...] = (*_SEVEN, *((0.55 * r, 0.55 * g, 0.55 * b) for r, g
 class PaintingVerbs(Editor):
     """Paint, erase, merge, split, remove."""
 
-    def default_axis(self, surface: str, patch: str, points: SurfacePoints, generator: str | None) -> SurfacePoints:
+    def default_axis(
+        self, surface: str, patch: str, points: SurfacePoints, generator: str | AxisGenerator | None
+    ) -> SurfacePoints:
         """Axis points for a patch that was painted without; a session asks its axis generators."""
         raise InvalidInput(
             f"the patch {patch!r} needs an axis: pass `axis` with one point and a heading, or with more points."
@@ -52,14 +55,15 @@ class PaintingVerbs(Editor):
         axis: SurfacePoints | None = None,
         heading: complex | None = None,
         dense: bool = True,
-        generator: str | None = None,
+        generator: str | AxisGenerator | None = None,
         strength: Any = None,
         color: Color | None = None,
     ) -> int:
         """Paint points: a new patch, or more points on one that exists (and on all that share its shape).
 
-        A new patch needs `surface`, and an axis: picked points, or one of a generator. strength: (n,) 0..1, a
-        brush's falloff, multiplies the default weights. Points painted twice are kept once.
+        A new patch needs `surface`, and an axis: picked points, or one of a generator: its name, or one made with
+        settings (`plugins.make`). strength: (n,) 0..1, a brush's falloff, multiplies the default weights. Points
+        painted twice are kept once.
         """
         if patch in self.document.patches:
             return self.submit(self._extension(patch, points, strength))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.contact.axis import Axis, draw_axis
+from contact_core.contact.axis_generator import AxisGenerator
 from contact_core.contact.linkage import follow_link, link_to
 from contact_core.contact.patch import parameterize_patch
 from contact_core.contact.placement import Link, Placement, Root
@@ -28,7 +29,7 @@ class ReshapingVerbs(PaintingVerbs):
         *,
         heading: complex | None = None,
         dense: bool = True,
-        generator: str | None = None,
+        generator: str | AxisGenerator | None = None,
     ) -> int:
         """Draw the axis of a patch anew. Its points, its children and its partners stay where they are."""
         surface = self.document.patch(patch).surface

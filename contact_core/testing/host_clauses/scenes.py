@@ -26,9 +26,10 @@ class SceneClauses(HostGround):
     """Units, objects, surfaces and where they are."""
 
     def test_h01_says_its_units_and_axes(self, build: Build) -> None:
-        """A host tells the scene's metres per unit and up axis, and its surfaces carry them."""
+        """A host tells what it is, the scene's metres per unit and up axis, and its surfaces carry them."""
         for space in self.spaces:
             host = build(contract_scene(space))
+            assert len(host.summary.split()) >= 3, host.summary
             said = host.space()
             assert (said.meters_per_unit, said.up_axis) == (pytest.approx(space.meters_per_unit), space.up_axis)
             asset = host.read_surface(object_id(host, "plain"))

@@ -59,6 +59,7 @@ class VectorHeatEngine:
     """The GeodesicEngine of potpourri3d; approximate, by the tolerances below."""
 
     name = "vector-heat"
+    summary = "logarithmic maps by the vector heat method: approximate, fast far away"
     exact = False
     tolerances = EngineTolerances(distance=0.03, trace=1e-6, round_trip=0.05)
 

@@ -23,6 +23,7 @@ class GltfFiles:
     """glTF 2.0, binary or JSON, on the standard library and numpy alone."""
 
     name = "gltf"
+    summary = "glTF 2.0 scenes, with skeletons and their skins"
     suffixes = (".glb", ".gltf")
     can_read = True
     can_write = True

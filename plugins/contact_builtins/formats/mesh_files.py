@@ -26,6 +26,7 @@ class MeshFiles:
     """Reads polygon meshes; none of these formats knows units, up axis or rigs."""
 
     name = "mesh"
+    summary = "meshes in the common files without a skeleton"
     suffixes = tuple(PARSERS)
     can_read = True
     can_write = False

@@ -32,6 +32,7 @@ class SceneMeshFiles:
     """Reads the surfaces of scenes; rigs come by glTF or USD."""
 
     name = "scene-mesh"
+    summary = "meshes of COLLADA and 3MF scenes"
     suffixes = (".dae", ".3mf")
     can_read = True
     can_write = False

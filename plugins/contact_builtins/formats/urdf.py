@@ -30,6 +30,7 @@ class UrdfFiles:
     """
 
     name = "urdf"
+    summary = "robots as URDF describes them, links and joints"
     suffixes = (".urdf", ".xacro")  # an expanded robot often keeps the ending; one with macros is refused in words
     can_read = True
     can_write = False

@@ -32,6 +32,7 @@ class SoftwareRenderer:
     """Draws everywhere; the last resort of `contact pose`."""
 
     name = "software"
+    summary = "plain pictures by numpy alone, where no graphics card is"
     priority = 0
 
     def unavailable(self) -> str | None:

@@ -85,6 +85,7 @@ class Sketch:
     """A renderer that keeps what it was given and writes a token."""
 
     name = "sketch"
+    summary = "draws nothing but remembers"
     priority = 10_000
 
     def __init__(self) -> None:
