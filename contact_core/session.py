@@ -73,6 +73,7 @@ class Session(PluginVerbs, ProposalVerbs):
         self._announcer = Announcer()
         self._announcer.listen(self._tell_plugins)
         self._file: OpenDocument | None = None
+        self._opening_notes: tuple[str, ...] = ()
         self._under_way = UnderWay()
         self._equip(plugins, discover=discover)
         if engine is not None:
@@ -86,6 +87,8 @@ class Session(PluginVerbs, ProposalVerbs):
             link = HostLink(self, host)
             if document is None:
                 self.history = link.stored_history() or self.history
+            else:
+                self.history = link.joined_history(document, "the document that was given") or self.history
             self.history = self._bound(self.history, surfaces, objects)
             link.listen()  # last: a session that refuses its document leaves nothing behind in the host
             self._host_link = link
@@ -141,18 +144,34 @@ class Session(PluginVerbs, ProposalVerbs):
         """A session on a document file, new where there is none, with lock and journal beside it.
 
         An interrupted journal is replayed, and `notes` says so. Where another process has the document, the session
-        is read-only, and `notes` says who. arguments: as for Session. Raises FileRefused.
+        is read-only, and `notes` says who. arguments: as for Session. In a host that keeps documents, the file is
+        only read, and the contacts live on in the scene. Raises FileRefused, also where the scene holds others.
         """
         session = cls(**arguments)
         try:
             commands = BUILT_IN_COMMANDS
             if journal_path(real_path(Path(path))).exists():  # it may hold commands of plugins
                 commands = session.plugins.offers(COMMANDS)
-            session._file, session.history = OpenDocument.open(Path(path), commands)
+            session._start_from(*OpenDocument.open(Path(path), commands))
         except BaseException:
             session.close()
             raise
         return session
+
+    def _start_from(self, file: OpenDocument, history: History) -> None:
+        """Go on with a document file, or, in a host that keeps documents, with its content."""
+        self._file = file
+        if self._host_link is None or not self._host_link.stores:
+            self.history = history
+            return
+        joined = self._host_link.joined_history(history.document, file.path.name)
+        self.history = self._bound(joined or History(history.document))
+        self._file = None
+        self._opening_notes = (
+            *file.notes,
+            f"the contacts of {file.path.name} live in the scene now; it stays as it is.",
+        )
+        file.close(in_order=history.is_clean)
 
     @property
     def path(self) -> Path | None:
@@ -163,7 +182,8 @@ class Session(PluginVerbs, ProposalVerbs):
     def notes(self) -> tuple[str, ...]:
         """Sentences on what opening the file or the scene found."""
         own = self._file.notes if self._file is not None else ()
-        return own + (tuple(self._binding.missing.values()) if self._binding is not None else ())
+        missing = tuple(self._binding.missing.values()) if self._binding is not None else ()
+        return self._opening_notes + own + missing
 
     @property
     def read_only(self) -> bool:
@@ -263,6 +283,8 @@ class Session(PluginVerbs, ProposalVerbs):
                 self._under_way.macro.do(command)
                 return self.revision
             host_keeps_steps = self._host_link is not None and self._host_link.has_undo
+            if self._host_link is not None:
+                self._host_link.check_unchanged()
             step = self.history.prepare(command, origin, merge=merge and not host_keeps_steps)
             before = self.history.document
             with self._in_host(step.command.label(), before, step.after, step.revision):

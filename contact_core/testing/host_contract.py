@@ -15,13 +15,14 @@ from contact_core.testing.host_clauses.extras import ExtraClauses
 from contact_core.testing.host_clauses.ground import Build
 from contact_core.testing.host_clauses.rigs import RigClauses
 from contact_core.testing.host_clauses.scenes import SceneClauses
+from contact_core.testing.host_clauses.sessions import SessionClauses
 from contact_core.testing.host_clauses.undo import UndoClauses
 
 __all__ = ["Build", "HostContract"]
 
 
 # pytest collects the bases from the last to the first, so this is the order of the clauses' numbers.
-class HostContract(ExtraClauses, UndoClauses, DocumentClauses, RigClauses, SceneClauses, Contract):
+class HostContract(SessionClauses, ExtraClauses, UndoClauses, DocumentClauses, RigClauses, SceneClauses, Contract):
     """Fixture `build(scene)`: a host on a natively made scene. spaces: units and axes that the host can have."""
 
     about, letter = "host", "H"

@@ -9,7 +9,7 @@ import importlib.util
 import os
 import sys
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -65,7 +65,7 @@ class TestTakesEverythingForMetres(Mutant, OnMemory):
 
 class TestListsSkinsAgain(Mutant, OnMemory):
     breaks = "H02"
-    consequences = ("H20",)
+    consequences = ("H20", "H36")
 
     class Host(MemoryHost):
         def objects(self) -> tuple[SceneObject, ...]:
@@ -271,7 +271,7 @@ class TestResetsOtherJoints(Mutant, OnMemory):
 
 class TestKeysTheNextFrame(Mutant, OnMemory):
     breaks = "H18"
-    consequences = ("H20",)
+    consequences = ("H20", "H36")
 
     class Host(MemoryHost):
         def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
@@ -280,7 +280,7 @@ class TestKeysTheNextFrame(Mutant, OnMemory):
 
 class TestKeysEveryFrameBefore(Mutant, OnMemory):
     breaks = "H18"
-    consequences = ("H20",)
+    consequences = ("H20", "H36")
 
     class Host(MemoryHost):
         def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
@@ -362,7 +362,7 @@ class TestMakesTwoStepsOfOne(Mutant, OnMemory):
 
 class TestKeepsAStalePoseAfterUndo(Mutant, OnMemory):
     breaks = "H24"
-    consequences = ("H28", "H29")
+    consequences = ("H28", "H29", "H36")
 
     class Host(MemoryHost):
         def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -385,6 +385,7 @@ class TestKeepsAStalePoseAfterUndo(Mutant, OnMemory):
 
 class TestTellsBeforeItUndoes(Mutant, OnMemory):
     breaks = "H25"
+    consequences = ("H36", "H37")
 
     class Host(MemoryHost):
         def _go(self, by: int) -> bool:
@@ -524,3 +525,26 @@ class TestWritesWithoutUnits(Mutant, OnMemory):
     class Host(MemoryHost):
         def add(self, asset: Asset, world_from_surface: Any = None) -> str:
             return super().add(replace(asset, meters_per_unit=None), world_from_surface)
+
+
+class TestKeysOutliveUndo(Mutant, OnMemory):
+    breaks = "H36"
+
+    class Host(MemoryHost):
+        def undo(self) -> bool:
+            keys = {item.id: self._object(item.id).keys for item in self.objects()}
+            undone = super().undo()
+            for object_id, kept in keys.items():
+                if object_id in self._scene.objects:
+                    back = replace(self._object(object_id), keys=kept)
+                    self._scene = self._scene.with_object(object_id, back)
+            return undone
+
+
+class TestKnowsOneListener(Mutant, OnMemory):
+    breaks = "H37"
+
+    class Host(MemoryHost):
+        def on_undo(self, listener: Callable[[], None]) -> Callable[[], None]:
+            self._listeners.clear()
+            return super().on_undo(listener)

@@ -250,13 +250,11 @@ class TestHelpless(BrushMutant):
 
 
 class Flipped(GltfFiles):
-    """Turns every triangle round."""
+    """Turns every triangle round, after its surfaces were wound outwards."""
 
-    def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
-        turned = [
-            replace(asset, mesh=type(asset.mesh)(asset.mesh.points, asset.mesh.faces[:, ::-1])) for asset in assets
-        ]
-        super().write(path, turned, poses)
+    def read(self, path: Path, *, sidecar: Path | None = None) -> Asset:
+        asset = super().read(path, sidecar=sidecar)
+        return replace(asset, mesh=type(asset.mesh)(asset.mesh.points, asset.mesh.faces[:, ::-1]))
 
 
 class Unposed(GltfFiles):

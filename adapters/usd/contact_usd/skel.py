@@ -15,8 +15,8 @@ from pxr import Usd, UsdGeom, UsdSkel
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
-from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.triangulate import triangulate
+from contact_core.geometry.weld import weld
 from contact_core.rig.rig import Rig
 from contact_core.scene.host import SceneSpace
 from contact_core.scene.reading import stretch_rig
@@ -156,18 +156,11 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
     if query.HasBlendShapes():
         notes.append("blend shapes are not part of the rig; the skin is without them.")
     joints, weights = _varying_influences(query, skeleton, len(arrays.points), path)
-    # points at one position stay apart where their influences differ, or the skin would tear differently
-    alike = np.unique(np.hstack([joints, weights]), axis=0, return_inverse=True)[1].reshape(-1)
-    sound = sound_polygons(
-        arrays.points,
-        arrays.face_sizes,
-        arrays.face_indices,
-        apart=alike,
-        exact=True,
-        clockwise=arrays.left_handed,
+    kept, of_source = weld(arrays.points, tolerance=0.0)
+    first, of_source = _split_unlike(of_source, len(kept), joints, weights)
+    faces, cut_faces, cut_notes = triangulate(
+        arrays.face_sizes, of_source[arrays.face_indices], arrays.points[first]
     )
-    first = sound.first
-    faces, cut, cut_notes = triangulate(sound.sizes, sound.indices, arrays.points[first])
     bind = matrix_of(query.GetGeomBindTransform(AS_IT_STANDS))
     if not np.isfinite(bind).all():
         raise InvalidInput(f"{path} has a geomBindTransform that is no number.")
@@ -177,12 +170,12 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
         path,
         arrays.points[first] @ bind[:3, :3].T + bind[:3, 3],
         faces,
-        arrays.faces[sound.face_of[cut]],
+        arrays.faces[cut_faces],
         first,
-        sound.point_of,
+        of_source,
         joints[first],
         weights[first],
-        tuple(f"{prim.GetName()}: {note}" for note in (*notes, *sound.notes, *cut_notes)),
+        tuple(f"{prim.GetName()}: {note}" for note in (*notes, *cut_notes)),
     )
 
 
@@ -208,6 +201,19 @@ def _varying_influences(
             raise InvalidInput(f"{path} names its joint number {off}, but lists {len(own)} joints of its own.")
         joints = np.array([order[str(token)] for token in own])[joints]
     return joints, weights
+
+
+def _split_unlike(group: IntArray, groups: int, joints: IntArray, weights: FloatArray) -> tuple[IntArray, IntArray]:
+    """Points at one position stay apart where their influences differ, or the skin would tear differently.
+
+    Returns first (p,) the own point behind each skin point and of_source (n,), its skin point.
+    """
+    first = np.full(groups, len(group), np.int64)
+    np.minimum.at(first, group, np.arange(len(group)))
+    alike = (joints == joints[first[group]]).all(axis=1) & (weights == weights[first[group]]).all(axis=1)
+    of_source = group.copy()
+    of_source[~alike] = groups + np.arange(np.count_nonzero(~alike))
+    return np.concatenate([first, np.flatnonzero(~alike)]), of_source
 
 
 def _influences(parts: list[SkinPart]) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
