@@ -31,6 +31,7 @@ from contact_builtins.demos import demo_recipe
 from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_core.arrays import FloatArray
 from contact_core.geometry.inside import depth_inside
+from contact_core.geometry.transform import transform_points
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.job.solving import settings_of
@@ -65,7 +66,7 @@ class Grip:
         """Of the deepest skin vertex in the true solids, in % of the length: no grid comes in between."""
         state = problem.state(theta)
         into = np.linalg.inv(self.job.placed)
-        points = skin(self.job.rig, state.motions[0].world) @ into[:3, :3].T + into[:3, 3]
+        points = transform_points(into, skin(self.job.rig, state.motions[0].world))
         deepest = max(depth_inside(points, solid).max() for solid in self.job.solids or (self.job.object.mesh,))
         return 100.0 * float(deepest) / problem.manipulator_length
 

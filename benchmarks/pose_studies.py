@@ -20,6 +20,7 @@ from contact_builtins.solvers.stepwise import ProgressiveSolver, StagedSolver
 from contact_core.arrays import FloatArray
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.transform import transform_points
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
@@ -84,7 +85,7 @@ def judged(full: PoseProblem, solution: PoseSolution) -> Judged:
     gap = np.linalg.norm(state.vectors(full.pairs.gap), axis=1)
     world = state.motions[1].world[0] @ np.linalg.inv(full.bodies[1].rig.bind_world[0])
     into = np.linalg.inv(world)
-    points = skin(full.bodies[0].rig, state.motions[0].world) @ into[:3, :3].T + into[:3, 3]
+    points = transform_points(into, skin(full.bodies[0].rig, state.motions[0].world))
     depth = -DistanceField.of(full.bodies[1].rig.surface, resolution=128).sample(points)[0]
     inner = ~(full.is_root | full.is_translation)
     return Judged(

@@ -10,6 +10,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
+from contact_core.geometry.transform import transform_points
 
 
 def touching_vertices(
@@ -23,7 +24,7 @@ def touching_vertices(
     if not 0.0 < distance < np.inf:
         raise InvalidInput(f"contacts lie within a positive distance, but {distance} came.")
     matrix = np.eye(4) if other_from_posed is None else np.asarray(other_from_posed, dtype=float).reshape(4, 4)
-    points = posed.points @ matrix[:3, :3].T + matrix[:3, 3]
+    points = transform_points(matrix, posed.points)
     normals = posed.vertex_normals @ matrix[:3, :3].T
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     used = np.unique(posed.faces)

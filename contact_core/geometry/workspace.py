@@ -1,9 +1,10 @@
-"""The memory that a log-map query works in: allocated once per mesh, resident only where queries have been."""
+"""The memory that a log-map query works in: allocated once per mesh, and kept."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -12,24 +13,27 @@ from contact_core.geometry.kernel_arrays import Labels, Queue, Targets, Windows
 from contact_core.geometry.mesh import TriangleMesh
 
 _POPS = 4  # queue_kernels.POPS; importing that would import numba
+TOUCHED = 2**28  # bytes: 1.4 million faces
 
 
 class Workspace:
     """Arrays for one query at a time on a mesh of n points and m faces, in the groups that kernels take.
 
-    Nothing is cleared between queries: a row whose first entry is not the epoch of the query counts as empty. The
-    arrays begin as untouched zero pages, so memory grows with the regions visited, not with the mesh.
+    Nothing is cleared between queries: a row whose first entry is not the epoch of the query counts as empty. Up to
+    TOUCHED bytes the pages are written to at once, so that the first query in a region costs no page faults; of a
+    larger mesh they become resident where queries go, and memory grows with the regions visited.
     """
 
     def __init__(self, point_count: int, face_count: int) -> None:
-        self.labels = Labels(
-            epoch=0.0,
-            reach=np.zeros((point_count, 2)),
-            leg=np.zeros((point_count, 3)),
-            origin=np.zeros((point_count, 4), np.int64),
-        )
+        reach, leg = np.zeros((point_count, 2)), np.zeros((point_count, 3))
+        origin = np.zeros((point_count, 4), np.int64)
+        self.labels = Labels(0.0, reach, leg, origin)
         self._occupied: FloatArray = np.zeros((3 * face_count, 5))
         self._waiting: FloatArray = np.zeros((face_count, 2))
+        arrays: tuple[Any, ...] = (reach, leg, origin, self._occupied, self._waiting)
+        if sum(array.nbytes for array in arrays) <= TOUCHED:
+            for array in arrays:
+                array.fill(0)
         self._state: IntArray = np.zeros(7, np.int64)
         self.reserve(4096)
 
@@ -37,6 +41,9 @@ class Workspace:
         """Make room for so many windows at once."""
         self.windows = Windows(np.empty((windows, 10)), np.empty((windows, 4), np.int64), self._occupied)
         self.queue = Queue(np.empty(2 * windows), np.empty(2 * windows, np.int64), self._state)
+        fresh: tuple[Any, ...] = (self.windows.floats, self.windows.integers, self.queue.keys, self.queue.items)
+        for array in fresh:
+            array.fill(0)
 
     def targets(self, count: int) -> Targets:
         """Records for so many targets."""

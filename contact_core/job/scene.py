@@ -13,6 +13,7 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
+from contact_core.geometry.transform import transform_points
 from contact_core.job.recipe import CoarseSpec
 from contact_core.rig.chart import Chart
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
@@ -71,7 +72,7 @@ def away_pose(
     locator = Locator.of(mesh)
     travelled, nearest = 0.0, 0.0
     for _ in range(200):
-        points = (rest + travelled * way) @ into_object[:3, :3].T + into_object[:3, 3]
+        points = transform_points(into_object, rest + travelled * way)
         nearest = float(locator.closest(points).distance.min())
         if nearest >= clear * (1.0 - 1e-6):
             break
@@ -90,13 +91,13 @@ def posed_skin(rig: Rig, pose: Pose, placed: FloatArray | None = None) -> Triang
     points = skin(rig, posed_world(rig, pose))
     if placed is not None:
         into_object = np.linalg.inv(placed)
-        points = points @ into_object[:3, :3].T + into_object[:3, 3]
+        points = transform_points(into_object, points)
     return TriangleMesh(points, rig.faces)
 
 
 def moved(mesh: TriangleMesh, matrix: FloatArray) -> TriangleMesh:
     """A mesh under a rigid motion (4, 4)."""
-    return TriangleMesh(mesh.points @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces)
+    return TriangleMesh(transform_points(matrix, mesh.points), mesh.faces)
 
 
 def _turn(axis: int, angle: float) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.transform import transform_points
 from contact_core.motion.problem import MotionProblem
 from contact_core.motion.reduction import Reduction
 from contact_core.motion.skate import ObjectGaps
@@ -160,7 +161,7 @@ def _deepest(problem: PoseProblem, state: PoseState, name: str, solid: Solid) ->
             continue
         vertices, _ = thinned(body.rig.surface, SAMPLES)
         world = state.vectors(vertex_track(body.rig, vertices, int(problem.bone_offsets[index])))
-        points = world @ into[:3, :3].T + into[:3, 3]
+        points = transform_points(into, world)
         near = ((points > solid.low) & (points < solid.high)).all(axis=1)
         if near.any():
             deepest = max(deepest, solid.scale * float(solid.depths(points[near]).max()))

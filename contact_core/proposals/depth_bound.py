@@ -9,6 +9,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.geometry.inside import Sunk
+from contact_core.geometry.transform import transform_points
 from contact_core.solve.penetration import Allowance, NoDeeperTerm, Solid, Solids, solids_of
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import posed_mesh
@@ -90,7 +91,7 @@ def measured(problem: PoseProblem, theta: FloatArray, solids: Mapping[str, Solid
 def _into(solid: Solid, state: PoseState, points: FloatArray) -> FloatArray:
     """World points (n, 3) in a solid's surface space."""
     surface_from_world = solid.surface_from_world(state)
-    return np.asarray(points @ surface_from_world[:3, :3].T + surface_from_world[:3, 3])
+    return transform_points(surface_from_world, points)
 
 
 def _skins(problem: PoseProblem) -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray, frozen
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import Rig
 
 FITTED_SHARE = 0.7  # of the median distance from skin to bone: capsules stay within flesh that gives
@@ -42,7 +43,7 @@ def fit_capsules(rig: Rig, share: float = FITTED_SHARE) -> Capsules:
             segment, radius = _capsule(own, rig.rest_world[joint, :3, 3], share)
             into = np.linalg.inv(rig.rest_world[joint])
             joints.append(joint)
-            ends.append(segment @ into[:3, :3].T + into[:3, 3])
+            ends.append(transform_points(into, segment))
             radii.append(radius)
     none = np.zeros((0, 2), np.int64)
     alone = Capsules(np.array(joints, np.int64), np.array(ends).reshape(-1, 2, 3), np.array(radii, float), none)

@@ -14,6 +14,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.chart import Chart
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
 from contact_core.scene.host import RigReading, SceneReading
@@ -141,7 +142,7 @@ class EvaluatedRig(DeformedSkin):
 
         def deform(theta: FloatArray) -> FloatArray:
             points = host.skin_points(object_id, self._pose_at(theta))
-            return np.asarray(points @ place[:3, :3].T + place[:3, 3])
+            return transform_points(place, points)
 
         scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
         dofs = [self._dof(int(q), size) for q in self._free]

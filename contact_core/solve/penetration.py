@@ -16,6 +16,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.inside import depth_inside
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.skinning import Track, vertex_track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import uniform_scale
@@ -208,7 +209,7 @@ class _Depths:
 
 def _touch(state: PoseState, skin: _Skin, solid: Solid) -> _Touch:
     surface_from_world = solid.surface_from_world(state)
-    points = state.vectors(skin.track) @ surface_from_world[:3, :3].T + surface_from_world[:3, 3]
+    points = transform_points(surface_from_world, state.vectors(skin.track))
     away = max(-float(skin.allowed.min(initial=0.0)), 0.0) / solid.scale  # vertices that have to keep a distance
     rows = np.flatnonzero(((points > solid.low - away) & (points < solid.high + away)).all(axis=1))
     rows = rows[solid.scale * solid.distances(points[rows]) + skin.allowed[rows] < 0.0]

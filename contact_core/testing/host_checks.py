@@ -8,6 +8,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, digest
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import Pose, Rig
 from contact_core.scene.host import DocumentStorage, PoseWriting, RigReading
 from contact_core.scene.picture import Picture, PictureMesh
@@ -68,8 +69,8 @@ def world_error(host: Any, name: str, scene: HostScene) -> float:
     assert is_rigid(placement), placement
     made = next(mesh for mesh in scene.meshes if mesh.name == name)
     world = scene.world_of(name)
-    wanted = made.points @ world[:3, :3].T + world[:3, 3]
-    ours = mesh.points @ placement[:3, :3].T + placement[:3, 3]
+    wanted = transform_points(world, made.points)
+    ours = transform_points(placement, mesh.points)
     return float(np.abs(ours - wanted).max() / mesh.bounding_box_diagonal)
 
 
@@ -91,7 +92,7 @@ def picture_of(host: Any, name: str) -> Picture:
     """The object where it stands."""
     key = object_id(host, name)
     mesh, placement = host.read_surface(key).mesh, host.placement(key)
-    placed = mesh.with_points(mesh.points @ placement[:3, :3].T + placement[:3, 3])
+    placed = mesh.with_points(transform_points(placement, mesh.points))
     return Picture(meshes=(PictureMesh(placed, (0.5, 0.5, 0.5)),))
 
 

@@ -14,6 +14,7 @@ from contact_blender.channels import snapshot, write_basis
 from contact_blender.rig import armature_from_mesh
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.transform import transform_points
 
 
 @contextmanager
@@ -70,4 +71,4 @@ def skin_in_armature(scene_object: Any, armature: Any) -> FloatArray:
             " with them; switch those modifiers off in the viewport."
         )
     matrix = armature_from_mesh(scene_object, armature, depsgraph)
-    return np.asarray(points[sources] @ matrix[:3, :3].T + matrix[:3, 3])
+    return transform_points(matrix, points[sources])

@@ -20,6 +20,7 @@ from contact_blender.freedom import freedom_of
 from contact_blender.weights import group_weights, influences
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
 from contact_core.geometry.weld import weld
 from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics
@@ -98,7 +99,7 @@ def read_rig(scene_object: Any, armature: Any, depsgraph: Any, name: str) -> Rig
         points = _shaped_points(scene_object, local.points)
         joints, weights = _influences(cage, scene_object, armature, skeleton)
     placed = armature_from_mesh(scene_object, armature, depsgraph)
-    points = points @ placed[:3, :3].T + placed[:3, 3]  # (n source, 3)
+    points = transform_points(placed, points)  # (n source, 3)
     joints, weights, notes = _normalised(joints, weights, len(skeleton.joints))
     kept, vertices = _merged(points, joints, weights)
     if len(kept) < len(points):

@@ -21,6 +21,7 @@ from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactPair
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.transform import transform_points
 from contact_core.session import Session
 from contact_usd.host import UsdHost
 from contact_usd.storage import ROOT, contacts_prim
@@ -188,7 +189,7 @@ def _surface_points(prim: Usd.Prim) -> SurfacePoints:
 
 
 def _placed(points: FloatArray, world: FloatArray) -> FloatArray:
-    return points @ world[:3, :3].T + world[:3, 3]
+    return transform_points(world, points)
 
 
 def _text(prim: Usd.Prim, attribute: str, value: str) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import Pose
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def _one_mesh(host: UsdHost, path: Path, ids: list[str]) -> Asset:
     """All surfaces where they stand, one below the other; the maps go to the stage's own points and faces."""
     parts = [host.read_surface(key) for key in ids]
     places = [host.placement(key) for key in ids]
-    placed = [p.mesh.points @ m[:3, :3].T + m[:3, 3] for p, m in zip(parts, places, strict=True)]
+    placed = [transform_points(m, p.mesh.points) for p, m in zip(parts, places, strict=True)]
     starts = np.cumsum([0, *(len(points) for points in placed)])[:-1]
     space = host.space()
     sources = [np.asarray(part.source_vertices) + start for part, start in zip(parts, starts, strict=True)]

@@ -15,6 +15,7 @@ from pxr import Usd, UsdGeom, UsdSkel
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
+from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
 from contact_core.geometry.weld import weld
 from contact_core.rig.rig import Rig
@@ -168,7 +169,7 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
         faces = faces[:, [0, 2, 1]]
     return SkinPart(
         path,
-        arrays.points[first] @ bind[:3, :3].T + bind[:3, 3],
+        transform_points(bind, arrays.points[first]),
         faces,
         arrays.faces[cut_faces],
         first,

@@ -10,6 +10,7 @@ import pytest
 from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.geometry.raycast import Locator
+from contact_core.geometry.transform import transform_points
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.solver import SolveStatus
 from contact_core.testing import rigs
@@ -54,7 +55,7 @@ class ExtraClauses(HostGround):
         place = host.placement(object_id(host, "plain"))
         local = np.linalg.inv(place)
         hits = Locator(host.read_surface(object_id(host, "plain")).mesh).cast(
-            origins @ local[:3, :3].T + local[:3, 3], directions @ local[:3, :3].T
+            transform_points(local, origins), directions @ local[:3, :3].T
         )
         assert (hits.faces >= 0).tolist() == [True, False, False]
         _, (above, below) = host.rays([[width / 2, 0.0], [width / 2, float(height)]])

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.testing.contract import needs
 from contact_core.testing.host_checks import ACCURACY, dense_weights, is_rigid, object_id, pose_error
@@ -46,8 +47,8 @@ class RigClauses(HostGround):
         placement = host.placement(object_id(host, "half_arm"))
         world = scene.world_of("half_arm")
         made = arm_rig()
-        points = made.surface.points @ world[:3, :3].T + world[:3, 3]
-        ours = asset.mesh.points @ placement[:3, :3].T + placement[:3, 3]
+        points = transform_points(world, made.surface.points)
+        ours = transform_points(placement, asset.mesh.points)
         np.testing.assert_allclose(ours, points, atol=1e-5)
         assert is_rigid(placement)
         wrist = (placement @ asset.rig.rest_world[asset.rig.joint_index("wrist")])[:3, 3]

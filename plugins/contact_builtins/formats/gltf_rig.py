@@ -19,6 +19,7 @@ from contact_builtins.formats.sidecar import Sidecar
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import JointFreedom, Rig
 
 MAX_JOINTS = 4096
@@ -247,7 +248,7 @@ def _joined(
             weight = np.zeros((len(part.points), len(index_of)))
             weight[:, table] = own
             bridge = skeleton.corrections[part.skin]
-            placed = part.points @ bridge[:3, :3].T + bridge[:3, 3]
+            placed = transform_points(bridge, part.points)
         else:
             carrier = part.node
             while carrier >= 0 and carrier not in index_of:
@@ -257,7 +258,7 @@ def _joined(
                 continue
             joint = index_of[carrier]  # rides rigidly: back from where it rests to where it was bound
             move = skeleton.bind[joint] @ np.linalg.inv(skeleton.rest[joint])
-            placed = part.points @ move[:3, :3].T + move[:3, 3]
+            placed = transform_points(move, part.points)
             weight = np.zeros((len(part.points), len(index_of)))
             weight[:, joint] = 1.0
         points.append(placed)

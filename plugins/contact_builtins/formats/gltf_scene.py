@@ -12,6 +12,7 @@ from contact_builtins.formats.gltf_container import COMPRESSED, Gltf
 from contact_builtins.formats.refusal import bounded
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import FileRefused, InvalidInput
+from contact_core.geometry.transform import transform_points
 
 POINTS, LINES, TRIANGLES, STRIP, FAN = 0, (1, 2, 3), 4, 5, 6
 
@@ -103,7 +104,7 @@ def _part(gltf: Gltf, nodes: Nodes, node: int, skin: Any, primitive: dict[str, A
     joints, weights = _influences(gltf, attributes, len(points)) if skin is not None else (None, None)
     if joints is None:
         world = nodes.world[node]
-        points = points @ world[:3, :3].T + world[:3, 3]
+        points = transform_points(world, points)
         if np.linalg.det(world[:3, :3]) < 0:  # a mirrored node turns its faces round (glTF 2.0, 3.7.4)
             faces = faces[:, ::-1]
     return Part(node, skin if joints is not None else None, points, faces, joints, weights)

@@ -17,6 +17,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import Pose
 
 Placed = tuple[FloatArray, IntArray, IntArray]  # points (n, 3), corners per face (f,), point of each corner
@@ -163,7 +164,7 @@ def _placed_3mf(
         if np.linalg.det(world[:3, :3]) < 0:
             faces = faces[:, ::-1]
         if len(faces):
-            yield points @ world[:3, :3].T + world[:3, 3], np.full(len(faces), 3), faces.ravel()
+            yield transform_points(world, points), np.full(len(faces), 3), faces.ravel()
     for component in entry.iterfind(f"{_CORE}components/{_CORE}component"):
         yield from _placed_3mf(objects, component, world, budget, depth + 1)
 

@@ -20,6 +20,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry import solids
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics
 
 
@@ -162,7 +163,7 @@ def _skin(
             placed = world[joint] @ visual.origin
             size = bounded(size + len(solid[0]) + len(solid[1]), "vertices and faces of links in all")
             faces.append(solid[1] + total)
-            points.append(solid[0] @ placed[:3, :3].T + placed[:3, 3])
+            points.append(transform_points(placed, solid[0]))
             owners.append(np.full(len(solid[0]), joint))
             total += len(solid[0])
     if not points:
