@@ -7,6 +7,7 @@ thread flushes it to the disk within FLUSH_SECONDS, which is the window that a p
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from pathlib import Path
@@ -32,6 +33,7 @@ class Journal:
         self.path = path
         self._number = last_number
         self._id = journal_id
+        self._owed: dict[str, Any] | None = None  # a line for which there was no room
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
         except OSError as error:
@@ -76,8 +78,14 @@ class Journal:
         self._append({"goto": revision})
 
     def saved(self, revision: int, file_digest: str) -> None:
-        """Record that the document file now holds the document of `revision`. Raises FileRefused."""
-        self._append({"saved": revision, "file": file_digest})
+        """Record that the document file now holds the document of `revision`.
+
+        The file is written and cannot be taken back, so a journal without room is no error here: the line is
+        written with the next event. Until then the documents tell the next opening that the journal belongs here.
+        """
+        self._owed = {"saved": revision, "file": file_digest}
+        with contextlib.suppress(FileRefused):
+            self._append()
 
     def flush(self) -> None:
         """To the disk, now; edits go on being recorded meanwhile. Raises OSError."""
@@ -112,19 +120,22 @@ class Journal:
             if self._flusher is not None:
                 self._flusher.join()
 
-    def _append(self, event: dict[str, Any]) -> None:
+    def _append(self, *events: dict[str, Any]) -> None:
+        """Write lines for events, after a line that is owed: all or none. Raises FileRefused."""
         with self._lock:
-            line = encode_line(event, self._number + 1, self._id)
+            due = events if self._owed is None else (self._owed, *events)
+            lines = b"".join(encode_line(event, self._number + k, self._id) for k, event in enumerate(due, start=1))
             if self._file < 0:
                 raise FileRefused(f"the journal {self.path} is closed.")
             if self._broken is not None:
                 raise FileRefused(self._broken)
             try:
-                _write_all(self._file, line)
+                _write_all(self._file, lines)
             except OSError as error:
                 self._take_back(error)
-            self._length += len(line)
-            self._number += 1
+            self._length += len(lines)
+            self._number += len(due)
+            self._owed = None
         self._flush_later()
 
     def _take_back(self, error: OSError) -> None:

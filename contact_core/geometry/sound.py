@@ -7,12 +7,13 @@ mends that for every reader and host, and says what it did.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from contact_core.arrays import BoolArray, FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray, frozen
 from contact_core.geometry.stitch import (
     Sides,
     joined_points,
@@ -21,6 +22,7 @@ from contact_core.geometry.stitch import (
     without,
     without_crowds,
 )
+from contact_core.geometry.triangulate import check_polygons
 from contact_core.geometry.weld import close_points
 from contact_core.geometry.winding import Winding, facing_inwards, wound_alike
 
@@ -44,9 +46,9 @@ class SoundPolygons:
 
 
 def sound_polygons(
-    points: FloatArray,
-    sizes: IntArray,
-    indices: IntArray,
+    points: Any,
+    sizes: Any,
+    indices: Any,
     *,
     apart: IntArray | None = None,
     exact: bool = False,
@@ -55,19 +57,20 @@ def sound_polygons(
     """Join, drop doubles, turn. points: (n, 3) finite. sizes: (f,) corners per polygon. indices: their points.
 
     apart: (n,) labels; points of different labels never become one. exact: only bit-equal positions are joined.
-    clockwise: polygons are wound so seen from outside. What is manifold stays so (`stitch`).
+    clockwise: polygons are wound so seen from outside. What is manifold stays so (`stitch`). Raises InvalidInput.
     """
-    notes: list[str] = []
-    sides = Sides.of(sizes, indices)
-    reach = np.zeros(len(points)) if exact else _reach(points, sides)
-    group = _groups(points, sides, reach, apart)
-    kept = _single_faces(group, sizes, indices, notes)
-    if not kept.all():
-        sides = Sides.of(sizes[kept], indices[np.repeat(kept, sizes)])
-    pairs, label = _joined(points, sides, group, either_sense=True)
+    points = frozen(points, np.float64, (None, 3), "points")
+    sizes = frozen(sizes, np.int64, (None,), "face sizes")
+    indices = frozen(indices, np.int64, (None,), "face indices")
+    check_polygons(sizes, indices, len(points))
+    shape = Sides.of(sizes, indices)
+    reach = np.zeros(len(points)) if exact else _reach(points, shape)
+    joining = _joining(points, sizes, indices, _groups(points, shape, reach, apart), either_sense=True)
+    notes = list[str]()
     if not exact:
-        pairs, label, group = _joined_across_noise(points, sides, apart, (pairs, label, group), notes)
-    winding, label = _wound(sides, int(kept.sum()), group, pairs, label)
+        joining = _across_noise(points, sizes, indices, apart, joining, notes)
+    kept, sides = joining.kept, joining.sides
+    winding, label = _wound(joining)
     first = np.unique(label, return_index=True)[1]
     turned = _turned_outwards(points[first], sides.between(label), winding, clockwise, notes)
     return SoundPolygons(
@@ -76,7 +79,7 @@ def sound_polygons(
         sizes=sizes[kept],
         indices=label[_reversed_where(turned, sides)],
         face_of=np.flatnonzero(kept),
-        notes=(*_joining_notes(len(points), len(first)), *notes, *_loose_notes(sides.between(label), winding)),
+        notes=(*_joining_notes(np.unique(sides.tail), label), *joining.notes, *notes, *_loose_notes(winding)),
     )
 
 
@@ -158,53 +161,71 @@ def _doubles(suspects: IntArray, group: IntArray, sizes: IntArray, indices: IntA
     return doubles
 
 
-def _joined(points: FloatArray, sides: Sides, group: IntArray, *, either_sense: bool) -> tuple[IntArray, IntArray]:
-    """Pairs of sides that were joined (p, 2), and the label of each point (n,)."""
+@dataclass(frozen=True, eq=False)
+class _Joining:
+    """kept: (f,) faces that remain. sides: theirs. group: (n,) place of each point. pairs: (p, 2) joined sides.
+    label: (n,) each point after that."""
+
+    kept: BoolArray
+    sides: Sides
+    group: IntArray
+    pairs: IntArray
+    label: IntArray
+    notes: tuple[str, ...]
+
+
+def _joining(
+    points: FloatArray, sizes: IntArray, indices: IntArray, group: IntArray, *, either_sense: bool
+) -> _Joining:
+    notes: list[str] = []
+    kept = _single_faces(group, sizes, indices, notes)
+    sides = Sides.of(sizes[kept], indices[np.repeat(kept, sizes)])
+    pairs, label = np.zeros((0, 2), np.int64), np.arange(len(points))
     loose = open_sides(sides)
-    if not len(loose):
-        return np.zeros((0, 2), np.int64), np.arange(len(points))
-    pairs = pairs_of_open_sides(points, sides, loose, group, either_sense=either_sense)
-    return without_crowds(len(points), sides, group, pairs)
+    if len(loose):
+        pairs = pairs_of_open_sides(points, sides, loose, group, either_sense=either_sense)
+        pairs, label = without_crowds(len(points), sides, group, pairs)
+    return _Joining(kept, sides, group, pairs, label, tuple(notes))
 
 
-def _joined_across_noise(
+def _across_noise(
     points: FloatArray,
-    sides: Sides,
+    sizes: IntArray,
+    indices: IntArray,
     apart: IntArray | None,
-    so_far: tuple[IntArray, IntArray, IntArray],
+    so_far: _Joining,
     notes: list[str],
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Pairs, labels and groups after joining open sides that nearly meet, where that closes most of what is open.
+) -> _Joining:
+    """The same after joining open sides that nearly meet, where that closes most of what is open.
 
-    Then the gaps are noise of whatever wrote the file, and no part of the shape.
+    Then the gaps are noise of whatever wrote the file, and no part of the shape. Sides that run the same direction
+    are joined in heaps of loose faces only: the borders of two layers of cloth run so, too.
     """
-    label = so_far[1]
-    met = sides.between(label)
-    still = open_sides(met)
+    still = open_sides(so_far.sides.between(so_far.label))
     if not len(still):
         return so_far
-    border = np.unique(np.concatenate([sides.tail[still], sides.head[still]]))
+    sides = Sides.of(sizes, indices)
+    border = np.unique(np.concatenate([so_far.sides.tail[still], so_far.sides.head[still]]))
     reach = SHARE_OF_EDGE * _shortest_edges(points, sides)
-    gap = _gaps(points[border], label[border])
+    gap = _gaps(points[border], so_far.label[border])
     near = gap <= reach[border]
     if np.count_nonzero(near) < _MOST * len(border):
         return so_far
     widest = float(gap[near].max())
-    wider = _groups(
-        points, sides, np.minimum(reach, 2.0 * widest), apart
-    )  # twice: copies of one point all round it
-    new_pairs, new_label = _joined(points, sides, wider, either_sense=False)
-    left = len(open_sides(sides.between(new_label)))
+    group = _groups(points, sides, np.minimum(reach, 2.0 * widest), apart)  # twice: copies lie all round a point
+    heap = len(still) > _HEAP * len(so_far.sides.face)
+    wider = _joining(points, sizes, indices, group, either_sense=heap)
+    left = len(open_sides(wider.sides.between(wider.label)))
     if left > (1.0 - _MOST) * len(still):
         return so_far
     notes.append(
         f"{len(still) - left} of {len(still)} open edges met another one up to {widest:.3g} away and were joined"
         " with it: the copies of their points differ by more than rounding."
     )
-    return new_pairs, new_label, wider
+    return wider
 
 
-_MOST = 0.75
+_MOST, _HEAP = 0.75, 0.25  # share of open sides, see _across_noise
 
 
 def _gaps(places: FloatArray, label: IntArray) -> FloatArray:
@@ -218,8 +239,10 @@ def _gaps(places: FloatArray, label: IntArray) -> FloatArray:
     return np.asarray(distance[np.unique(label, return_inverse=True)[1].reshape(-1), 1])
 
 
-def _wound(sides: Sides, faces: int, group: IntArray, pairs: IntArray, label: IntArray) -> tuple[Winding, IntArray]:
+def _wound(joining: _Joining) -> tuple[Winding, IntArray]:
     """The winding, and the labels: a one-sided surface is left open where it was joined, not against itself."""
+    sides, pairs, label = joining.sides, joining.pairs, joining.label
+    faces = int(np.count_nonzero(joining.kept))
     own, _ = sides.edges
     while True:
         met = sides.between(label)
@@ -233,7 +256,7 @@ def _wound(sides: Sides, faces: int, group: IntArray, pairs: IntArray, label: In
         if not wrong.any() or not len(pairs):
             return winding, label
         pairs = without(pairs, met, edge, wrong)
-        label = joined_points(len(label), sides, group, pairs)
+        label = joined_points(len(label), sides, joining.group, pairs)
 
 
 def _turned_outwards(
@@ -263,11 +286,12 @@ def _reversed_where(turned: BoolArray, sides: Sides) -> IntArray:
     return sides.tail[np.where(turned[sides.face], backwards, where)]
 
 
-def _joining_notes(before: int, after: int) -> list[str]:
+def _joining_notes(used: IntArray, label: IntArray) -> list[str]:
+    before, after = len(used), len(np.unique(label[used]))
     return [f"{before} vertices lie at {after} positions; they were welded."] if after < before else []
 
 
-def _loose_notes(sides: Sides, winding: Winding) -> list[str]:
+def _loose_notes(winding: Winding) -> list[str]:
     """A word on what stays a heap of loose faces."""
     pieces, faces = int(winding.piece.max(initial=-1)) + 1, len(winding.piece)
     if pieces < 100 or pieces < faces / 4:

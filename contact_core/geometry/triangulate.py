@@ -28,7 +28,7 @@ def triangulate(face_sizes: Any, face_indices: Any, points: Any) -> tuple[IntArr
     sizes = frozen(face_sizes, np.int64, (None,), "face_sizes")
     corners = frozen(face_indices, np.int64, (None,), "face_indices")
     positions = frozen(points, np.float64, (None, 3), "points")
-    _check(sizes, corners, len(positions))
+    check_polygons(sizes, corners, len(positions))
     if (sizes == 3).all():
         return _only_triangles(corners.reshape(-1, 3))
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]) if len(sizes) else np.zeros(0, np.int64)
@@ -169,7 +169,8 @@ def _all_different(corners: IntArray) -> BoolArray:
     return different
 
 
-def _check(sizes: IntArray, corners: IntArray, count: int) -> None:
+def check_polygons(sizes: IntArray, corners: IntArray, count: int) -> None:
+    """Raises InvalidInput on sizes (f,) that do not fit the corners, and corners beyond `count` points."""
     if len(sizes) and sizes.min() < 0:
         raise InvalidInput(f"face sizes must not be negative, but face {int(sizes.argmin())} has {sizes.min()}.")
     if int(sizes.sum()) != len(corners):

@@ -15,8 +15,8 @@ from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.placement import Placement
+from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.triangulate import triangulate
-from contact_core.geometry.weld import weld
 from contact_core.rig.rig import JointFreedom, Pose, Rig
 from contact_core.scene.host import SceneSpace
 
@@ -34,25 +34,24 @@ def surface_of_polygons(
 ) -> Asset:
     """The surface of a polygon mesh in its own space: points (n, 3), corners per face, indices face after face.
 
-    Points at bit-equal positions (texture seams) become one. The cut into triangles is chosen in the object's own
+    Open edges at bit-equal positions (texture seams) are joined, closed surfaces turned outwards, doubled faces
+    dropped (`geometry.sound`). The cut into triangles is chosen in the object's own
     space, so it does not depend on where the object stands. clockwise: the host winds faces the other way round.
     """
     local = np.asarray(points, np.float64).reshape(-1, 3)
-    kept, vertex_of_source = weld(local, tolerance=0.0)
-    indices = np.asarray(face_indices, np.int64)
-    faces, source_faces, cut_notes = triangulate(face_sizes, vertex_of_source[indices], kept)
+    sound = sound_polygons(local, face_sizes, face_indices, exact=True, clockwise=clockwise)
+    kept = local[sound.first]
+    faces, cut, cut_notes = triangulate(sound.sizes, sound.indices, kept)
     if clockwise != placement.mirrored:
         faces = faces[:, [0, 2, 1]]
-    if len(kept) < len(local):
-        notes = (*notes, f"{len(local) - len(kept)} points shared a position with another and were merged.")
     return Asset(
         name=name,
         mesh=TriangleMesh(placement.surface_points(kept), faces),
-        source_vertices=vertex_of_source,
-        source_faces=source_faces,
+        source_vertices=sound.point_of,
+        source_faces=sound.face_of[cut],
         meters_per_unit=space.meters_per_unit,
         up_axis=space.up_axis,
-        notes=(*notes, *cut_notes),
+        notes=(*notes, *sound.notes, *cut_notes),
     )
 
 

@@ -20,9 +20,9 @@ from contact_blender.freedom import freedom_of
 from contact_blender.weights import group_weights, influences
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
-from contact_core.geometry.weld import weld
 from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics
 
 UNMOVED = "(unmoved)"  # the joint of vertices that no bone moves
@@ -101,11 +101,12 @@ def read_rig(scene_object: Any, armature: Any, depsgraph: Any, name: str) -> Rig
     placed = armature_from_mesh(scene_object, armature, depsgraph)
     points = transform_points(placed, points)  # (n source, 3)
     joints, weights, notes = _normalised(joints, weights, len(skeleton.joints))
-    kept, vertices = _merged(points, joints, weights)
-    if len(kept) < len(points):
-        notes.append(f"{len(points) - len(kept)} points shared position and weights with another and were merged.")
-    faces, polygons, cut_notes = triangulate(local.sizes, vertices[local.corners], points[kept])
-    if np.linalg.det(placed[:3, :3]) < 0:
+    mirrored = bool(np.linalg.det(placed[:3, :3]) < 0)
+    alike = np.unique(np.hstack([joints, weights]), axis=0, return_inverse=True)[1].reshape(-1)
+    sound = sound_polygons(points, local.sizes, local.corners, apart=alike, exact=True, clockwise=mirrored)
+    kept = sound.first  # points at one position stay apart where they would move apart
+    faces, cut, cut_notes = triangulate(sound.sizes, sound.indices, points[kept])
+    if mirrored:
         faces = faces[:, ::-1]
     freedoms = [freedom_of(armature.pose.bones[b], _translates(armature, b)) for b in skeleton.joints]
     names, parents, rest = skeleton.joints, skeleton.parents, skeleton.rest_local
@@ -115,7 +116,7 @@ def read_rig(scene_object: Any, armature: Any, depsgraph: Any, name: str) -> Rig
         rest, bind = np.concatenate([rest, np.eye(4)[None]]), np.concatenate([bind, np.eye(4)[None]])
         freedoms.append(JointFreedom("fixed"))
     rig = Rig(name, names, parents, rest, bind, points[kept], faces, joints[kept], weights[kept], tuple(freedoms))
-    return RigReading(rig, vertices, polygons, (*notes, *cut_notes))
+    return RigReading(rig, sound.point_of, sound.face_of[cut], (*notes, *sound.notes, *cut_notes))
 
 
 def _translates(armature: Any, bone: str) -> bool:
@@ -195,14 +196,3 @@ def _normalised(joints: IntArray, weights: FloatArray, unmoved: int) -> tuple[In
     weights[loose] = np.eye(1, weights.shape[1])
     joints = np.where(loose[:, None], unmoved, joints)
     return np.where(weights > 0.0, joints, joints[:, :1]), weights, notes
-
-
-def _merged(points: FloatArray, joints: IntArray, weights: FloatArray) -> tuple[IntArray, IntArray]:
-    """Kept source vertices (n,) and the kept one of each (n source,): equal positions, unless they move apart."""
-    positions, group = weld(points, tolerance=0.0)
-    first = np.full(len(positions), len(points))
-    np.minimum.at(first, group, np.arange(len(points)))
-    alike = (joints == joints[first[group]]).all(axis=1) & (weights == weights[first[group]]).all(axis=1)
-    if not alike.all():
-        return np.arange(len(points)), np.arange(len(points))
-    return first, group

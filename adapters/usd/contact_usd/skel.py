@@ -15,9 +15,9 @@ from pxr import Usd, UsdGeom, UsdSkel
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
+from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
-from contact_core.geometry.weld import weld
 from contact_core.rig.rig import Rig
 from contact_core.scene.host import SceneSpace
 from contact_core.scene.reading import stretch_rig
@@ -157,11 +157,18 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
     if query.HasBlendShapes():
         notes.append("blend shapes are not part of the rig; the skin is without them.")
     joints, weights = _varying_influences(query, skeleton, len(arrays.points), path)
-    kept, of_source = weld(arrays.points, tolerance=0.0)
-    first, of_source = _split_unlike(of_source, len(kept), joints, weights)
-    faces, cut_faces, cut_notes = triangulate(
-        arrays.face_sizes, of_source[arrays.face_indices], arrays.points[first]
+    # points at one position stay apart where their influences differ, or the skin would tear differently
+    alike = np.unique(np.hstack([joints, weights]), axis=0, return_inverse=True)[1].reshape(-1)
+    sound = sound_polygons(
+        arrays.points,
+        arrays.face_sizes,
+        arrays.face_indices,
+        apart=alike,
+        exact=True,
+        clockwise=arrays.left_handed,
     )
+    first = sound.first
+    faces, cut, cut_notes = triangulate(sound.sizes, sound.indices, arrays.points[first])
     bind = matrix_of(query.GetGeomBindTransform(AS_IT_STANDS))
     if not np.isfinite(bind).all():
         raise InvalidInput(f"{path} has a geomBindTransform that is no number.")
@@ -171,12 +178,12 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
         path,
         transform_points(bind, arrays.points[first]),
         faces,
-        arrays.faces[cut_faces],
+        arrays.faces[sound.face_of[cut]],
         first,
-        of_source,
+        sound.point_of,
         joints[first],
         weights[first],
-        tuple(f"{prim.GetName()}: {note}" for note in (*notes, *cut_notes)),
+        tuple(f"{prim.GetName()}: {note}" for note in (*notes, *sound.notes, *cut_notes)),
     )
 
 
@@ -202,19 +209,6 @@ def _varying_influences(
             raise InvalidInput(f"{path} names its joint number {off}, but lists {len(own)} joints of its own.")
         joints = np.array([order[str(token)] for token in own])[joints]
     return joints, weights
-
-
-def _split_unlike(group: IntArray, groups: int, joints: IntArray, weights: FloatArray) -> tuple[IntArray, IntArray]:
-    """Points at one position stay apart where their influences differ, or the skin would tear differently.
-
-    Returns first (p,) the own point behind each skin point and of_source (n,), its skin point.
-    """
-    first = np.full(groups, len(group), np.int64)
-    np.minimum.at(first, group, np.arange(len(group)))
-    alike = (joints == joints[first[group]]).all(axis=1) & (weights == weights[first[group]]).all(axis=1)
-    of_source = group.copy()
-    of_source[~alike] = groups + np.arange(np.count_nonzero(~alike))
-    return np.concatenate([first, np.flatnonzero(~alike)]), of_source
 
 
 def _influences(parts: list[SkinPart]) -> tuple[IntArray, FloatArray, tuple[str, ...]]:

@@ -149,7 +149,7 @@ def test_seams_are_welded_and_told(tmp_path: Path) -> None:
     asset = UsdHost(tmp_path / "seams.usda").read_surface("/solid")
     assert len(asset.mesh.points) == len(POINTS) and volume(asset.mesh) == pytest.approx(STEP_VOLUME)
     np.testing.assert_allclose(asset.mesh.points[asset.source_vertices], POINTS[INDICES])
-    assert any("merged" in note for note in asset.notes)
+    assert any("welded" in note for note in asset.notes)
 
 
 def test_prototypes_of_point_instancers_are_no_objects(tmp_path: Path) -> None:

@@ -113,6 +113,7 @@ def kill_200_times(tmp_path: Path) -> None:
         allowed.append(dump_document(twin.document))
         recovered = Session.open(path, discover=False)
         assert dump_document(recovered.document) in allowed, f"kill {number} after {acknowledged} actions"
+        assert not [found for found in tmp_path.iterdir() if found.name.startswith(f".{path.name}.")]
         interrupt(recovered)
         history = recovered.history
         actions += acknowledged
@@ -140,6 +141,31 @@ def test_a_full_disk_refuses_the_edit_and_keeps_everything(tmp_path: Path) -> No
         session.do(SetExtra("small", 1))  # there is room again, and the journal is still sound
         wanted = session.document
     assert same_documents(replay(read_journal(journal_path(path))).history.document, wanted)
+
+
+@posix
+def test_a_save_that_the_journal_has_no_room_to_record_is_recorded_with_the_next_edit(tmp_path: Path) -> None:
+    """The document is written all the same: saving succeeds, and after a crash the journal still belongs to it."""
+    import resource
+
+    path = tmp_path / "document.json"
+    session = Session.open(path, discover=False)
+    for number in range(40):
+        session.do(SetExtra("number", number))
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (journal_path(path).stat().st_size, limits[1]))
+    try:
+        session.save()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert session.history.is_clean and "saved" not in read_journal(journal_path(path)).events[-1]
+    session.do(SetExtra("number", "after"))
+    assert ["saved" in event for event in read_journal(journal_path(path)).events[-2:]] == [True, False]
+    interrupt(session)
+    with Session.open(path, discover=False) as again:
+        assert dict(again.document.extras) == {"number": "after"} and "recovered" in again.notes[0]
+        again.undo()
+        assert again.history.is_clean
 
 
 def test_an_interrupted_journal_is_replayed_and_said_so(tmp_path: Path) -> None:

@@ -277,6 +277,23 @@ def test_noise_on_a_soup_is_bridged_with_a_note(seed: int, name: str, quads: boo
         assert any("open edges met another one" in note for note in sound.notes)
 
 
+@pytest.mark.parametrize("how", ["mixed", "inwards", "twice"])
+def test_noise_comes_together_with_other_faults(how: str) -> None:
+    mesh = meshes.torus()
+    faces = mesh.faces.copy()
+    if how == "mixed":
+        faces[::3] = faces[::3, ::-1]
+    elif how == "inwards":
+        faces = faces[:, ::-1]
+    else:
+        faces = np.concatenate([faces, faces])
+    points, loose = soup(TriangleMesh(mesh.points, faces))
+    ours, _ = made_sound(points + np.random.default_rng(3).normal(0.0, 2e-6, points.shape), loose)
+    found = report(ours)
+    assert found.is_watertight and found.genus == 1 and found.faces == len(mesh.faces)
+    assert np.isclose(found.volume or 0.0, volume_of(mesh), rtol=1e-4)
+
+
 def test_a_heap_whose_edges_do_not_meet_is_noted() -> None:
     leaves = meshes.copies(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), 200)
     _, sound = made_sound(leaves.points, leaves.faces)
