@@ -135,14 +135,14 @@ class History:
         return self.commit(Step(revision, command, before, apply_command(command, before), origin, merged))
 
     def undo(self) -> Step:
-        """Step back; answers the step that was undone. Raises CommandRejected at the beginning."""
+        """Step back; returns the step that was undone. Raises CommandRejected at the beginning."""
         if not self.can_undo:
             raise CommandRejected("there is nothing to undo.")
         self._cursor -= 1
         return self._steps[self._cursor]
 
     def redo(self) -> Step:
-        """Step forward again; answers the step. Raises CommandRejected at the end."""
+        """Step forward again; returns the step. Raises CommandRejected at the end."""
         if not self.can_redo:
             raise CommandRejected("there is nothing to redo.")
         self._cursor += 1
