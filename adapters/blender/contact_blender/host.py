@@ -85,6 +85,7 @@ class BlenderHost(
         self._undo = UndoBridge()
         self._overlay: Overlay | None = None
         self._cancel_asked = False
+        self._shows_progress = False
         self._known: dict[str, _KnownRig] = {}
         storage.restore_ids(bpy.context.scene, self._ids)
 
@@ -251,16 +252,17 @@ class BlenderHost(
         """Blender's progress cursor. Only a modal operator hears a key: it calls `cancel`."""
         asked, self._cancel_asked = self._cancel_asked, False
         manager = bpy.context.window_manager
+        over = asked or (fraction is not None and fraction >= 1.0)
+        if not self._shows_progress and not over:
+            manager.progress_begin(0.0, 1.0)  # the first that is told of a part is rarely 0
+            self._shows_progress = True
+        if fraction is not None and self._shows_progress:
+            manager.progress_update(min(max(fraction, 0.0), 1.0))
+        if over and self._shows_progress:
+            manager.progress_end()
+            self._shows_progress = False
         if asked:
-            manager.progress_end()
             raise Cancelled("it was cancelled in Blender.")
-        if fraction is None:
-            return
-        if fraction <= 0.0:
-            manager.progress_begin(0.0, 1.0)
-        manager.progress_update(min(max(fraction, 0.0), 1.0))
-        if fraction >= 1.0:
-            manager.progress_end()
 
     def cancel(self) -> None:
         self._cancel_asked = True
