@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
 from contact_core.arrays import FloatArray, frozen
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
@@ -22,10 +24,14 @@ ScreenToRays = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # (k, 2) -
 class BrushGesture:
     """One gesture over one mesh.
 
-    path: the k surface points that the pointer passed over, in order. screen: (c, 2) control points in the
-    host's screen units, and rays: the callable that turns screen positions into rays in surface space, for
-    brushes that draw in screen space. radius, spacing: surface units; 0 leaves the choice to the brush.
-    seed: for brushes that sample; equal gestures give equal points.
+    path: the k surface points that the pointer passed over, in order. screen: (c, 2) positions of the pointer, or
+    control points, in the host's screen units (pixels), and rays: the callable that turns screen positions into
+    rays in surface space. A gesture drawn on the screen may leave its path empty: `contact_core.contact.pointer`
+    then finds what the pointer passed over. seen: the same faces where the artist sees them, when the surface is
+    posed (`mesh.with_points(posed)`; keep it over a stroke, it holds the tree that rays ask), in the space of the
+    rays; None: as at rest. before: other surfaces in that space, which hide what lies behind them. radius,
+    spacing: surface units; 0 leaves the choice to the brush. seed: for brushes that sample; equal gestures give
+    equal points. Raises InvalidInput where `seen` has other faces.
     """
 
     mesh: TriangleMesh
@@ -35,6 +41,22 @@ class BrushGesture:
     screen: FloatArray | None = None
     rays: ScreenToRays | None = None
     seed: int = 0
+    seen: TriangleMesh | None = None
+    before: tuple[TriangleMesh, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.seen is None or self.seen.faces is self.mesh.faces:
+            return
+        if len(self.seen.points) != len(self.mesh.points) or not np.array_equal(self.seen.faces, self.mesh.faces):
+            raise InvalidInput(
+                f"a posed surface has the faces of the mesh ({self.mesh}), but {self.seen} has others; make it with"
+                " mesh.with_points(posed)."
+            )
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it says only on the screen where the pointer was."""
+        return not len(self.path) and self.screen is not None and self.rays is not None
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 from contact_builtins.brushes.sampling import darts, near_pieces, spacing_of, stroke_line, thinned
 from contact_core.arrays import BoolArray, ComplexArray, FloatArray
 from contact_core.contact.brush import BrushGesture, BrushMark
+from contact_core.contact.pointer import met
 from contact_core.errors import InvalidInput
 from contact_core.geometry import SurfacePoints, TriangleMesh, log_map
 from contact_core.settings import HasSettings, setting
@@ -29,7 +30,7 @@ class LassoBrush(HasSettings):
 
     def mark(self, gesture: BrushGesture) -> BrushMark:
         mesh = gesture.mesh
-        at = gesture.path.positions(mesh)
+        at = _corners(gesture)
         length = float(np.linalg.norm(np.roll(at, -1, axis=0) - at, axis=1).sum()) if len(at) else 0.0
         if len(at) < 3 or length <= 1e-9 * mesh.bounding_box_diagonal:
             raise InvalidInput(f"a lasso needs a closed curve of three points or more, but {len(at)} came.")
@@ -42,6 +43,15 @@ class LassoBrush(HasSettings):
         if not len(points):
             raise InvalidInput(f"the lasso holds no point at a spacing of {spacing:.3g}; make the spacing smaller.")
         return BrushMark(points, np.ones(len(points)))
+
+
+def _corners(gesture: BrushGesture) -> FloatArray:
+    """(k, 3) where the pointer was, as reported: the path, or what its rays meet."""
+    if not gesture.is_drawn:
+        return gesture.path.positions(gesture.mesh)
+    assert gesture.screen is not None
+    found = met(gesture, gesture.screen)
+    return found.points[found.hit].positions(gesture.mesh)
 
 
 def _inside(mesh: TriangleMesh, curve: SurfacePoints, points: SurfacePoints, reach: float) -> BoolArray:

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.contact.brush import BrushGesture
+from contact_core.contact.pointer import strokes
 from contact_core.errors import InvalidInput
 from contact_core.geometry import SurfacePoints, TriangleMesh, log_map
 from contact_core.geometry.raycast import Locator
@@ -50,10 +51,30 @@ def spacing_of(gesture: BrushGesture, radius: float) -> float:
 
 
 def stroke_line(gesture: BrushGesture, step: float, *, closed: bool = False) -> SurfacePoints:
-    """The stroke with points at most about `step` apart: the way between two points that the pointer reported goes
-    straight and drops onto the surface. Points in one place come once. Raises InvalidInput for an empty path."""
-    if not len(gesture.path):
+    """The stroke with points at most about `step` apart, those in one place once.
+
+    A gesture drawn on the screen is followed there, and is cut at silhouettes. Otherwise the path between two
+    points that the pointer reported goes straight and drops onto the surface. Raises InvalidInput for a stroke that
+    meets the surface nowhere.
+    """
+    line = _seen_line(gesture, step, closed) if gesture.is_drawn else _dropped_line(gesture, step, closed)
+    if not len(line):
         raise InvalidInput("a stroke needs at least one point on the surface, but none came.")
+    return line[first_of_each(line.positions(gesture.mesh), 1e-9 * gesture.mesh.bounding_box_diagonal)]
+
+
+def _seen_line(gesture: BrushGesture, step: float, closed: bool) -> SurfacePoints:
+    """Of each unbroken part of a stroke on the screen, its ends and points about `step` apart between them."""
+    chosen = []
+    for run in strokes(gesture, 0.5 * step, jump=step, closed=closed):
+        walked = np.concatenate([[0.0], np.cumsum(run.gaps)])
+        stops = np.searchsorted(walked, np.arange(0.0, walked[-1], 0.5 * step))
+        chosen.append(run.points[np.unique(np.append(stops, len(walked) - 1))])
+    return SurfacePoints.concatenate(chosen)
+
+
+def _dropped_line(gesture: BrushGesture, step: float, closed: bool) -> SurfacePoints:
+    """The path, and between its points others on straight lines in space, dropped onto the surface."""
     at = gesture.path.positions(gesture.mesh)
     ends = np.roll(at, -1, axis=0) if closed else np.concatenate([at[1:], at[-1:]])
     parts = []
@@ -63,8 +84,7 @@ def stroke_line(gesture: BrushGesture, step: float, *, closed: bool = False) -> 
         if count > 1:
             steps = np.arange(1, count)[:, None] / count
             parts.append(Locator.of(gesture.mesh).closest(start + steps * (end - start)).points)
-    line = SurfacePoints.concatenate(parts)
-    return line[first_of_each(line.positions(gesture.mesh), 1e-9 * gesture.mesh.bounding_box_diagonal)]
+    return SurfacePoints.concatenate(parts)
 
 
 def near_pieces(mesh: TriangleMesh, line: SurfacePoints, reach: float, size: float) -> Pieces:
