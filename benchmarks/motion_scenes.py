@@ -182,5 +182,5 @@ def skating(truth: MotionSolution) -> tuple[MotionProblem, FloatArray]:
         replace(p, contacts=feet, terms=(DistanceTerm(20.0), NormalTerm(2.0)), length=problem.manipulator_length)
         for p in motion.problems
     )
-    weights = MotionWeights(acceleration=3e-4, skate=5.0, follow=1.0)
+    weights = MotionWeights(acceleration=3e-4, skate=5.0, follow=100.0)
     return MotionProblem(motion.frames, frames, RATE, weights, reference={body: poses}), clip

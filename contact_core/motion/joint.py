@@ -40,6 +40,8 @@ class JointObjective:
         self.reference_acceleration: FloatArray | float = 0.0
         if self.reference is not None and len(motion.frames) > 2:
             self.reference_acceleration = self.clock.accelerations(self.chart.steps(self.reference).values)
+        share = np.where(self.problems[0].is_root, motion.weights.follow_root, 1.0)
+        self.follow_weights = motion.weights.follow * share  # (d,)
         self.bounds = motion.bounds.of(self.problems[0])
         n, d = motion.pinned.shape
         self.bound_weights = np.zeros((n - 1, d)), np.zeros((max(n - 2, 0), d))
@@ -58,7 +60,7 @@ class JointObjective:
         result |= {name: form.value() for name, form in self._forms(steps).items()}
         if self.reference is not None and self.motion.weights.follow > 0.0:
             away = self._away(states)[0].values[0::2]
-            result["follow"] = float(self.motion.weights.follow * self.clock.spans @ (away * away).sum(axis=1))
+            result["follow"] = float(self.clock.spans @ (away * away) @ self.follow_weights)
         return result
 
     def value(self, states: list[PoseState]) -> float:
@@ -138,7 +140,7 @@ class JointObjective:
     def _add_follow(self, states: list[PoseState], gradient: FloatArray, matrix: BlockBand) -> None:
         steps, thetas = self._away(states)
         weights = np.zeros_like(steps.values)
-        weights[0::2] = 2.0 * self.motion.weights.follow * self.clock.spans[:, None]
+        weights[0::2] = 2.0 * self.follow_weights * self.clock.spans[:, None]
         slopes = np.zeros((2 * len(thetas), thetas.shape[1]))
         steps.add_gradient(weights * steps.values, slopes)
         model = BlockBand.zeros(*slopes.shape)

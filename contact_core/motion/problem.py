@@ -24,15 +24,17 @@ class MotionWeights:
     acceleration: cost of 1 rad/s^2 (or 1 manipulator length/s^2) squared, during a second; the fourth root, 0.13 s
     by default, is about the shortest movement that is left in. skate: cost of a contact that slips 1 l/s (l: a
     centimetre on an 18 cm hand), squared, during a second. follow: cost of being 1 rad (or 1 length) away from the
-    reference, squared, during a second; it needs a reference.
+    reference, squared, during a second; it needs a reference. follow_root: the share of it for dofs that place a
+    whole body.
     """
 
     acceleration: float = 3e-4
     skate: float = 0.05
     follow: float = 0.0
+    follow_root: float = 0.01
 
     def __post_init__(self) -> None:
-        for name in ("acceleration", "skate", "follow"):
+        for name in ("acceleration", "skate", "follow", "follow_root"):
             value = getattr(self, name)
             if not 0.0 <= value < math.inf:
                 raise InvalidInput(

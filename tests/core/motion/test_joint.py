@@ -70,7 +70,7 @@ def full_objective(**more: float) -> tuple[JointObjective, FloatArray]:
     reference = tuple(problem.bodies[0].pose for problem in motion.problems)
     motion = replace(
         motion,
-        weights=MotionWeights(acceleration=1e-3, skate=0.1, follow=0.2),
+        weights=MotionWeights(acceleration=1e-3, skate=0.1, follow=0.2, follow_root=0.3),
         bounds=MotionBounds(turning_speed=2.0, turning_acceleration=20.0, travel_speed=5.0),
         reference={motion.problems[0].bodies[0].name: reference},
     )
@@ -308,7 +308,7 @@ def test_a_start_takes_the_place_of_the_causal_pass() -> None:
 def test_follow_keeps_a_reference() -> None:
     motion = molded(0.5)
     poses = tuple(moved_pose(0.1 * k) for k in range(len(motion.frames)))
-    following = replace(motion, weights=MotionWeights(3e-4, 0.0, 1e6), reference={"tentacle": poses})
+    following = replace(motion, weights=MotionWeights(3e-4, 0.0, 1e6, 1.0), reference={"tentacle": poses})
     solution = solve_motion(following)
     expected = [p.theta_of({"tentacle": pose}) for p, pose in zip(motion.problems, poses, strict=True)]
     assert np.abs(solution.thetas - expected).max() < 0.02
