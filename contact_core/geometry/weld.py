@@ -1,39 +1,15 @@
-"""Welding: points at one position become one point, with the map from the old points to the new.
+"""Which points lie at one place: the copies that files make along texture and normal seams.
 
-Files split vertices along texture and normal seams; geodesics need the surface that the eye sees.
+Close by distance, not by rounding to a grid: a grid line between two copies tears a seam open.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray, frozen
-from contact_core.errors import InvalidInput
+from contact_core.arrays import FloatArray, IntArray
 
-RELATIVE_TOLERANCE = 1e-6  # of the bounding box diagonal: above float32 rounding, far below any real edge
-_STEP, _LEVELS = 8.0, 8
-
-
-def weld(points: Any, tolerance: float | None = None) -> tuple[FloatArray, IntArray]:
-    """Merge points closer than `tolerance` (surface units; None: 1e-6 of the bounding box diagonal).
-
-    points: (n, 3). Returns the kept points (k, 3), bit-equal to the first of each group and in the order of
-    first appearance, and map (n,) with `kept[map[i]]` the point that i became. Closeness chains: a row of points,
-    each within tolerance of the next, becomes one. Tolerance 0 merges equal positions only. Raises InvalidInput.
-    """
-    positions = frozen(points, np.float64, (None, 3), "points")
-    if tolerance is None:
-        tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(positions, axis=0))) if len(positions) else 0.0
-    if not tolerance >= 0.0:
-        raise InvalidInput(f"the weld tolerance must be zero or positive, but {tolerance} came.")
-    if tolerance == 0.0 and _all_apart(positions):
-        return positions, np.arange(len(positions))
-    first, group = _equal_rows(positions)
-    if tolerance > 0.0 and len(first) > 1:
-        first, group = _join_close(positions, first, group, tolerance)
-    return positions[first], group
+_STEP, _LEVELS = 8.0, 8  # reaches of one level differ by less than the step
 
 
 def close_points(points: FloatArray, reach: FloatArray) -> IntArray:
@@ -50,7 +26,7 @@ def close_points(points: FloatArray, reach: FloatArray) -> IntArray:
     pairs = _pairs_within(points[first], shortest)
     if not len(pairs):
         return group
-    return _joined(len(points), first, group, pairs)[1]
+    return _joined(len(points), first, group, pairs)
 
 
 def _pairs_within(points: FloatArray, reach: FloatArray) -> IntArray:
@@ -90,18 +66,8 @@ def _equal_rows(positions: FloatArray) -> tuple[IntArray, IntArray]:
     return _by_first_appearance(order[fresh], group)
 
 
-def _join_close(
-    positions: FloatArray, first: IntArray, group: IntArray, tolerance: float
-) -> tuple[IntArray, IntArray]:
-    """The same, after joining groups whose positions are within tolerance of one another."""
-    from scipy.spatial import cKDTree
-
-    pairs = cKDTree(positions[first]).query_pairs(tolerance, output_type="ndarray")  # (p, 2)
-    return _joined(len(positions), first, group, pairs) if len(pairs) else (first, group)
-
-
-def _joined(total: int, first: IntArray, group: IntArray, pairs: IntArray) -> tuple[IntArray, IntArray]:
-    """First rows and groups after the groups of each of the pairs (p, 2) became one."""
+def _joined(total: int, first: IntArray, group: IntArray, pairs: IntArray) -> IntArray:
+    """The group of each row after the groups of each of the pairs (p, 2) became one."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -109,7 +75,7 @@ def _joined(total: int, first: IntArray, group: IntArray, pairs: IntArray) -> tu
     count, label = connected_components(graph, directed=False)
     earliest = np.full(count, total, np.int64)
     np.minimum.at(earliest, label, first)
-    return _by_first_appearance(earliest, label[group].astype(np.int64))
+    return _by_first_appearance(earliest, label[group].astype(np.int64))[1]
 
 
 def _by_first_appearance(first: IntArray, group: IntArray) -> tuple[IntArray, IntArray]:

@@ -1,6 +1,6 @@
 """OBJ, STL and OFF as their writers meant them: polygons stay polygons.
 
-Mesh libraries fan n-gons and merge vertices while reading (ADR 0040), which loses the connection to the file's own
+Mesh libraries fan n-gons and merge vertices while reading (ADR 0046), which loses the connection to the file's own
 faces, so these small formats are parsed here, and PLY in `ply`. Each parser takes bytes and returns Polygons, or
 raises InvalidInput with the line or face that is wrong; `refusal.refusing` makes a sentence of it.
 """

@@ -10,7 +10,7 @@ from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.triangulate import triangulate
-from contact_core.geometry.weld import weld
+from contact_core.geometry.weld import close_points
 
 
 def pole() -> Asset:
@@ -46,7 +46,8 @@ def grid_box(size: FloatArray, centre: FloatArray, cell: float) -> TriangleMesh:
                 quads[:, k, axis], quads[:, k, u], quads[:, k, v] = side * counts[axis], i + du, j + dv
             corners.append(quads)
     lattice = np.concatenate(corners).reshape(-1, 3)
-    points, index = weld(lattice / counts - 0.5, tolerance=0.0)
+    index = close_points(lattice / counts - 0.5, np.zeros(len(lattice)))
+    points = (lattice / counts - 0.5)[np.unique(index, return_index=True)[1]]
     triangles, _, _ = triangulate(np.full(len(lattice) // 4, 4), index, points)
     return TriangleMesh(points * size + centre, triangles)
 
