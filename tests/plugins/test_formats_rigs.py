@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contact_builtins.formats.freedom_guesses import guess_freedoms
 from contact_builtins.formats.gltf import GltfFiles
 from contact_builtins.formats.inspection import inspect
-from contact_builtins.formats.joint_names import digit_joint, mirrored_name, side_of, tree_from_names
 from contact_builtins.formats.sidecar import read_sidecar
 from contact_builtins.samples.skeleton import Bone, bone_frame, limits, rig_of, root
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
-from contact_core.rig.rig import JointFreedom, forward_kinematics, skin
+from contact_core.hands.freedoms import guess_freedoms
+from contact_core.hands.names import digit_joint, mirrored_name, side_of, tree_from_names
+from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics, skin
 from contact_core.testing import meshes
 from contact_core.testing.format_contract import bar
 
@@ -135,7 +135,7 @@ def test_flexion_closes_the_hand_whatever_the_joint_axes(
     rig = stick_hand(side, turn, own).rig
     assert rig is not None
     names = [f"{name}_{side[0]}" if named else name for name in rig.joints]
-    freedoms, notes = guess_freedoms(names, rig.parents, rig.rest_world, np.ones(len(names), bool))
+    freedoms, notes = guess_freedoms(replace(rig, joints=tuple(names)))
     assert any("guessed" in note for note in notes)
     for index, name in enumerate(rig.joints):
         if name == "wrist":
@@ -152,9 +152,13 @@ def test_flexion_closes_the_hand_whatever_the_joint_axes(
 def test_unknown_joints_are_open_and_idle_ones_are_held() -> None:
     world = np.tile(np.eye(4), (4, 1, 1))
     world[1:, 1, 3] = [1, 2, 3]
+    local = np.stack([world[0], world[1], np.linalg.inv(world[1]) @ world[2], world[3]])
+    ball = meshes.icosphere(1)
+    joints = np.arange(len(ball.points))[:, None] % 3
     freedoms, notes = guess_freedoms(
-        ["a", "b", "c", "pole_target"], np.array([-1, 0, 1, 0]), world, np.array([True, True, True, False])
-    )
+        Rig("rope", ("a", "b", "c", "pole_target"), np.array([-1, 0, 1, 0]), local, world, ball.points, ball.faces,
+            joints, np.ones(joints.shape), (JointFreedom(),) * 4)
+    )  # fmt: skip
     assert [f.kind for f in freedoms] == ["ball", "ball", "ball", "fixed"]
     assert freedoms[0].translates and not freedoms[1].translates and np.isinf(freedoms[1].upper).all()
     assert freedoms[1].frame[:, 0].tolist() == [0, 1, 0] and freedoms[1].prior_weight.tolist() == [3, 1, 1]

@@ -14,15 +14,53 @@ class Inspect:
     def configure(self, parser: argparse.ArgumentParser) -> None:
         parser.add_argument("file", type=Path, metavar="FILE")
         parser.add_argument("--sidecar", type=Path, metavar="RIG.toml", help="joint limits and hinges for the rig")
+        parser.add_argument(
+            "--picture", type=Path, metavar="FILE.png", help="draw the description of its hand there"
+        )
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_builtins.formats.inspection import inspect_asset
         from contact_core.plugins.reading import read_asset
 
         asset = read_asset(arguments.file, arguments.plugins, sidecar=arguments.sidecar)
+        if arguments.picture is not None:
+            _draw(asset, arguments)
         facts = {"file": str(arguments.file), **inspect_asset(asset)}
         arguments.output.answer(facts, _text(facts))
         return 0
+
+
+def _draw(asset: Any, arguments: argparse.Namespace) -> None:
+    """The hand's picture by the first renderer that can draw. Raises InvalidInput without a hand or renderer."""
+    from contact_builtins.cli.hand_picture import hand_pictures
+    from contact_core.errors import ContactError, InvalidInput
+    from contact_core.plugins.registry import RENDERERS
+
+    pictures = hand_pictures(asset)
+    reasons = []
+    for renderer in sorted(arguments.plugins.offers(RENDERERS).values(), key=lambda r: (-r.priority, r.name)):
+        try:
+            return renderer.render(pictures, arguments.picture, size=(1600, 800))
+        except ContactError as error:
+            reasons.append(f"{renderer.name}: {error}")
+    raise InvalidInput("no renderer could draw the picture: " + ("; ".join(reasons) or "no plugin offers one."))
+
+
+def _hand_lines(hand: dict[str, Any]) -> list[str]:
+    """A hand in lines: palm, digits from the thumb on, pads."""
+    palm = hand["palm"]
+    normal, fingers = (" ".join(f"{value:.2f}" for value in palm[key]) for key in ("normal", "fingers"))
+    kind = f"{hand['side'] or 'side unknown'} hand" if palm["is_plane"] else "claw"
+    lines = [
+        f"  {kind} at {hand['hub']} (confidence {hand['confidence']:.2f}):"
+        + (f" palm normal {normal}, fingers {fingers}" if palm["is_plane"] else f" axis {normal}")
+    ]
+    for digit in hand["digits"]:
+        joints = [bone["joint"] + ("" if bone["flexes"] else " (does not flex)") for bone in digit["bones"]]
+        joints += [f"{digit['tip_joint']} (tip)"] if digit["tip_joint"] else []
+        lines.append(f"    {digit['role']}: {', '.join(joints)}")
+    lines.append(f"    {_count(len(hand['pads']), 'pad')}: {', '.join(pad['name'] for pad in hand['pads'])}")
+    return lines + [f"    - {note}" for note in hand["notes"]]
 
 
 def _text(facts: dict[str, Any]) -> str:
@@ -47,6 +85,8 @@ def _text(facts: dict[str, Any]) -> str:
             f" {_count(rig['influences'], 'influence')} a vertex, {weights}",
             f"  the rest pose is {'' if rig['rest_is_bind'] else 'not '}the bind pose",
         ]
+    for hand in facts["hands"]:
+        lines += _hand_lines(hand)
     return "\n".join(lines + [f"  - {note}" for note in facts["notes"]])
 
 

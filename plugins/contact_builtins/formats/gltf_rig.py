@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from contact_builtins.formats.freedom_guesses import guess_freedoms
 from contact_builtins.formats.gltf_container import Gltf
 from contact_builtins.formats.gltf_scene import Nodes, Part
-from contact_builtins.formats.joint_names import mirrored_pairs, tree_from_names
 from contact_builtins.formats.polygons import Polygons, surface_of
 from contact_builtins.formats.refusal import bounded
 from contact_builtins.formats.sidecar import Sidecar
@@ -20,6 +18,8 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.transform import transform_points
+from contact_core.hands.freedoms import guess_freedoms
+from contact_core.hands.names import mirrored_pairs, tree_from_names
 from contact_core.rig.rig import JointFreedom, Rig
 
 MAX_JOINTS = 4096
@@ -58,9 +58,6 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
     _, groups = np.unique(np.round(weights / sums[:, None], 3), axis=0, return_inverse=True)
     surface = surface_of(Polygons.of_triangles(points, faces), groups.reshape(-1))
     picked = surface.first_source
-    used = np.zeros(len(skeleton.names), bool)
-    used[np.unique(kept[picked][influences[picked] > 0])] = True
-    freedoms, guessed = _freedoms(skeleton, used, sidecar)
     rest_local = skeleton.rest.copy()
     for index, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -75,10 +72,12 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
         faces=surface.faces,
         skin_joints=kept[picked],
         skin_weights=influences[picked],
-        freedoms=freedoms,
+        freedoms=tuple(JointFreedom() for _ in skeleton.names),
         meters_per_unit=(sidecar and sidecar.meters_per_unit) or 1.0,
         up_axis=(sidecar and sidecar.up_axis) or "Y",
     )
+    freedoms, guessed = _freedoms(rig, sidecar)
+    rig = replace(rig, freedoms=freedoms)
     off = float(np.abs(sums - 1.0).max())
     if off > 1e-3:
         notes.append(f"Skin weights summed to {sums.min():.4g}..{sums.max():.4g}; they were normalised.")
@@ -97,6 +96,7 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
             "influences": int((weights > 0).sum(axis=1).max()),
             "weights_sum_to_1": off <= 1e-3,
             "mirror": {**mirrored_pairs(skeleton.names), **(sidecar.mirror if sidecar else {})},
+            "hands": [asdict(words) for words in sidecar.hands] if sidecar else [],
         },
     )
 
@@ -129,7 +129,13 @@ def _skeleton(gltf: Gltf, nodes: Nodes, skins: list[int], sidecar: Sidecar | Non
     order = [order[k] for k in sequence]
     rank = {old: new for new, old in enumerate(sequence)}
     parents = np.array([rank[int(parents[k])] if parents[k] >= 0 else -1 for k in sequence])
-    rest, bound, scaled = _normalised(nodes.world[order], np.array([bind[index] for index in order]))
+    placed, bound, mirror = _unmirrored(nodes.world[order], np.array([bind[index] for index in order]))
+    if np.linalg.det(mirror) < 0:
+        corrections = {skin: mirror @ bridge for skin, bridge in corrections.items()}
+        notes.append(
+            "The rig stands mirrored in its scene (a negative scale above it); it was read as it stands there."
+        )
+    rest, bound, scaled = _normalised(placed, bound)
     if scaled:
         notes.append(f"Uniform joint scales ({scaled}) were taken out of the joint frames; the skin is unchanged.")
     return Skeleton(
@@ -148,6 +154,23 @@ def _bind_matrices(gltf: Gltf, entry: dict[str, Any], joints: list[int]) -> Floa
     if not np.isfinite(inverse).all() or (np.abs(np.linalg.det(inverse)) < 1e-30).any():
         raise InvalidInput("an inverse bind matrix is singular or not finite")
     return np.asarray(np.linalg.inv(inverse), np.float64)
+
+
+def _unmirrored(rest: FloatArray, bind: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rest and bind (j, 4, 4) with right-handed joint frames, and the (4, 4) from the old bind space to the new.
+
+    Where every joint rests mirrored against its bind, the bind pose is mirrored too; the skin stays as it is.
+    """
+    rest, bind = rest.copy(), bind.copy()
+    flip = np.diag([-1.0, 1.0, 1.0, 1.0])
+    resting, bound = np.linalg.det(rest[:, :3, :3]), np.linalg.det(bind[:, :3, :3])
+    mirrored = bool((resting * bound < 0).all())
+    if mirrored:
+        bind = flip @ bind
+    if mirrored or (resting * bound > 0).all():
+        left = resting < 0
+        rest[left], bind[left] = rest[left] @ flip, bind[left] @ flip
+    return rest, bind, flip if mirrored else np.eye(4)
 
 
 def _normalised(rest: FloatArray, bind: FloatArray) -> tuple[FloatArray, FloatArray, str]:
@@ -262,7 +285,8 @@ def _joined(
             weight = np.zeros((len(part.points), len(index_of)))
             weight[:, joint] = 1.0
         points.append(placed)
-        faces.append(part.faces + offset)
+        turned = part.skin is not None and np.linalg.det(skeleton.corrections[part.skin][:3, :3]) < 0
+        faces.append((part.faces[:, ::-1] if turned else part.faces) + offset)
         weights.append(weight)
         offset += len(part.points)
     return np.concatenate(points), np.concatenate(faces), np.concatenate(weights), notes
@@ -276,14 +300,15 @@ def _strongest(weights: FloatArray) -> tuple[IntArray, FloatArray]:
     return joints.astype(np.int64), kept / kept.sum(axis=1, keepdims=True)
 
 
-def _freedoms(skeleton: Skeleton, used: Any, sidecar: Sidecar | None) -> tuple[tuple[JointFreedom, ...], list[str]]:
+def _freedoms(rig: Rig, sidecar: Sidecar | None) -> tuple[tuple[JointFreedom, ...], list[str]]:
+    """Freedoms by the sidecar over guesses, and notes. Raises FileRefused, InvalidInput."""
     if sidecar is not None and not sidecar.guess:
-        freedoms: tuple[JointFreedom, ...] = tuple(JointFreedom(kind="fixed") for _ in skeleton.names)
+        freedoms: tuple[JointFreedom, ...] = tuple(JointFreedom(kind="fixed") for _ in rig.joints)
         notes: list[str] = []
     else:
-        freedoms, notes = guess_freedoms(skeleton.names, skeleton.parents, skeleton.rest, used)
+        freedoms, notes = guess_freedoms(rig, sidecar.hands if sidecar else ())
     if sidecar is not None:
-        freedoms = sidecar.freedoms(skeleton.names, freedoms)
+        freedoms = sidecar.freedoms(rig.joints, freedoms)
         notes = [f"Joint freedoms were set by {sidecar.path.name}."]
     return freedoms, notes
 

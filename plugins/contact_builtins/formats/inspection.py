@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.report import report
+from contact_core.hands.describe import describe_hands
+from contact_core.hands.description import HandDescription, HandWords
 from contact_core.plugins.slots import Format
 from contact_core.rig.rig import ROTATION_DOFS, Rig
 
@@ -47,10 +50,65 @@ def inspect_asset(asset: Asset) -> dict[str, Any]:
         "source_faces": source_faces,
         "meters_per_unit": asset.meters_per_unit,
         "up_axis": asset.up_axis,
+        "hands": [] if asset.rig is None else [hand_facts(asset.rig, hand) for hand in hands_of(asset)],
         "rig": None if asset.rig is None else _rig_facts(asset.rig, asset.details),
         "details": {key: value for key, value in asset.details.items() if key != "polygons"},
         "notes": list(asset.notes),
     }
+
+
+def hands_of(asset: Asset) -> tuple[HandDescription, ...]:
+    """The hands of a rig, what its sidecar says about them included. Raises InvalidInput for an object."""
+    if asset.rig is None:
+        raise InvalidInput(f"{asset.name} is an object without joints, so it has no hands.")
+    return describe_hands(asset.rig, tuple(HandWords(**words) for words in asset.details.get("hands", ())))
+
+
+def hand_facts(rig: Rig, hand: HandDescription) -> dict[str, Any]:
+    """A hand's description, JSON-able; directions and points in the rig's space at rest."""
+    digits = []
+    for digit in hand.digits:
+        bones = [
+            {
+                "joint": rig.joints[bone.joint],
+                "segment": bone.segment,
+                "flexes": bone.flexes,
+                "flexion_axis": _rounded(rig.rest_world[bone.joint, :3, :3] @ bone.frame[:, 2]),
+            }
+            for bone in digit.bones
+        ]
+        tip_joint = rig.joints[digit.tip_joint] if digit.tip_joint >= 0 else None
+        digits.append({"role": digit.role, "tip": _rounded(digit.tip), "tip_joint": tip_joint, "bones": bones})
+    pads = [
+        {
+            "name": pad.name,
+            "joint": rig.joints[pad.joint],
+            "centre": _rounded(pad.centre.positions(rig.surface)[0]),
+            "normal": _rounded(pad.normal),
+            "axis": [_rounded(end) for end in pad.axis.positions(rig.surface)],
+            "radius": round(pad.radius, 6),
+        }
+        for pad in hand.pads
+    ]
+    return {
+        "hub": rig.joints[hand.hub],
+        "side": hand.side,
+        "confidence": round(hand.confidence, 3),
+        "palm": {
+            "point": _rounded(hand.palm.point),
+            "normal": _rounded(hand.palm.normal),
+            "fingers": _rounded(hand.palm.fingers),
+            "is_plane": hand.palm.is_plane,
+        },
+        "opposition": None if hand.opposition is None else _rounded(hand.opposition),
+        "digits": digits,
+        "pads": pads,
+        "notes": list(hand.notes),
+    }
+
+
+def _rounded(vector: FloatArray) -> list[float]:
+    return [round(float(value), 5) for value in vector]
 
 
 def _rig_facts(rig: Rig, details: dict[str, Any]) -> dict[str, Any]:

@@ -13,13 +13,15 @@ import numpy as np
 from contact_builtins.formats.refusal import file_bytes
 from contact_core.arrays import FloatArray
 from contact_core.errors import FileRefused, InvalidInput
+from contact_core.hands.description import HandWords
 from contact_core.job.table import parse_toml
 from contact_core.rig.rig import ROTATION_DOFS, JointFreedom
 
 SCHEMA = 1
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
 ANGLES = ("twist", "spread", "flexion")  # about the frame's x, y, z
-TOP_KEYS = {"schema", "meters_per_unit", "up_axis", "guess", "joint", "mirror"}
+TOP_KEYS = {"schema", "meters_per_unit", "up_axis", "guess", "joint", "mirror", "hand"}
+HAND_KEYS = {"hub", "thumb", "side", "palm", "digits"}
 JOINT_KEYS = {
     "match", "parent", "kind", "order", "bone", "palmar", "axis", "limits", *ANGLES, "lock", "prior", "translates",
 }  # fmt: skip
@@ -35,6 +37,7 @@ class Sidecar:
     guess: bool = True
     meters_per_unit: float | None = None
     up_axis: Literal["X", "Y", "Z"] | None = None
+    hands: tuple[HandWords, ...] = ()
 
     def parents(self, names: Sequence[str]) -> dict[str, str]:
         """Parent by joint name, for the joints that a rule gives one. Raises FileRefused on unknown parents."""
@@ -108,7 +111,33 @@ def read_sidecar(path: Path) -> Sidecar:
         raise FileRefused(f"{path}: meters_per_unit must be a positive number; {scale!r} came.")
     if up not in (None, "X", "Y", "Z"):
         raise FileRefused(f'{path}: up_axis is "X", "Y" or "Z"; {up!r} came.')
-    return Sidecar(path, tuple(rules), mirror, bool(table.get("guess", True)), scale, up)
+    return Sidecar(
+        path, tuple(rules), mirror, bool(table.get("guess", True)), scale, up, _hands(path, table.get("hand", []))
+    )
+
+
+def _hands(path: Path, tables: Any) -> tuple[HandWords, ...]:
+    """What [[hand]] tables say. Raises FileRefused."""
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise FileRefused(f"{path}: hands are written as [[hand]] tables.")
+    for table in tables:
+        _known(path, table, HAND_KEYS, "a [[hand]]")
+        if not isinstance(table.get("hub"), str) or not isinstance(table.get("thumb", ""), str):
+            raise FileRefused(
+                f"{path}: each [[hand]] needs `hub`, the joint at which its digits part; `thumb` is a joint."
+            )
+        if table.get("side", "") not in ("", "left", "right"):
+            raise FileRefused(f'{path}: side is "left" or "right"; {table["side"]!r} came.')
+        digits = table.get("digits", {})
+        if not isinstance(digits, dict) or not all(isinstance(name, str) for name in digits.values()):
+            raise FileRefused(f"{path}: `digits` of a [[hand]] maps roles to joint names.")
+    try:
+        return tuple(
+            HandWords(**{**table, "palm": tuple(_direction(table["palm"]).tolist()) if "palm" in table else None})
+            for table in tables
+        )
+    except (InvalidInput, TypeError, ValueError) as error:
+        raise FileRefused(f"{path}: `palm` of a [[hand]]: {error}") from error
 
 
 def _known(path: Path, table: dict[str, Any], keys: set[str], where: str) -> None:

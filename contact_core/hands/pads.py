@@ -1,0 +1,72 @@
+"""Where a hand touches: round pads below the bones, on the side to which they close, and one in the palm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact_core.arrays import FloatArray
+from contact_core.geometry.raycast import Locator
+from contact_core.hands.anatomy import Anatomy, across, unit
+from contact_core.hands.description import Digit, Pad, Palm
+from contact_core.rig.rig import Rig
+
+OF_DEPTH = 0.85  # a pad's radius, of how deep the bone lies there
+OF_WIDTH = 0.32  # the palm's, of the width between the outer knuckles
+AT_TIP, AT_MIDDLE = 0.6, 0.5  # where on the last bone, and on others
+
+
+def pads_of(anatomy: Anatomy, digits: tuple[Digit, ...], palm: Palm, hub: int, width: float) -> tuple[Pad, ...]:
+    """Pads at each digit's end, at the middle of each longer finger, and in the palm where it is a plane."""
+    pads = []
+    for digit in digits:
+        flexing = [k for k, bone in enumerate(digit.bones) if bone.flexes]
+        chosen = flexing[-1:] + (flexing[-2:-1] if len(flexing) >= 3 and not digit.is_thumb else [])
+        for k in reversed(chosen):
+            pad = _below_bone(anatomy, digit, k)
+            pads += [pad] if pad is not None else []
+    if palm.is_plane:
+        radius = OF_WIDTH * width
+        origin = palm.point - 1e-3 * width * palm.normal
+        pad = _pad(anatomy.rig, "palm", "palm", hub, origin, palm.normal, palm.fingers, radius)
+        pads += [pad] if pad is not None else []
+    return tuple(pads)
+
+
+def _below_bone(anatomy: Anatomy, digit: Digit, place: int) -> Pad | None:
+    bone = digit.bones[place]
+    last = place == len(digit.bones) - 1
+    here = anatomy.position[bone.joint]
+    end = digit.tip if last else anatomy.position[digit.bones[place + 1].joint]
+    own = anatomy.rig.rest_world[bone.joint, :3, :3] @ bone.frame
+    origin = here + (AT_TIP if last else AT_MIDDLE) * (end - here)
+    along = unit(end - here)
+    name = f"{digit.role} {'tip' if last else bone.segment}"
+    return _pad(anatomy.rig, name, digit.role, bone.joint, origin, unit(across(own[:, 1], along)), along, None)
+
+
+def _pad(
+    rig: Rig, name: str, role: str, joint: int, origin: FloatArray, out: FloatArray, along: FloatArray,
+    radius: float | None,
+) -> Pad | None:  # fmt: skip
+    """The skin that a ray from within meets, and its axis; None where there is no skin that way."""
+    mesh = rig.surface
+    locator = Locator.of(mesh)
+    hit = locator.cast(origin[None], out[None])
+    if not hit.hit[0]:
+        return None
+    centre = hit.points()
+    normal = centre.normals(mesh)[0]
+    size = OF_DEPTH * float(hit.distance[0]) if radius is None else radius
+    heading = unit(across(along, normal))
+    at = centre.positions(mesh)[0]
+    ends = np.array([at - size * heading, at + size * heading])
+    axis = locator.closest(ends, facing=np.tile(-normal, (2, 1)), facing_limit=-0.1)
+    if not axis.found.all() or size <= 0:
+        return None
+    return Pad(name, role, joint, centre, normal, axis.points, size)
+
+
+def palm_point(anatomy: Anatomy, inside: FloatArray, normal: FloatArray) -> FloatArray:
+    """(3,) the skin above a point within the palm; the point itself where no skin lies that way."""
+    hit = Locator.of(anatomy.rig.surface).cast(inside[None], normal[None])
+    return np.asarray(inside + float(hit.distance[0]) * normal if hit.hit[0] else inside)
