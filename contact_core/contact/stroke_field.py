@@ -1,0 +1,86 @@
+"""The preview of a brush stroke: how far each vertex lies from what the pointer has passed over so far.
+
+A stroke only grows, so its distances only shrink: new points lower them round themselves, and nothing else is
+computed again. What a brush leaves is made once, at release; until then a front end colours by these distances.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray, frozen
+from contact_core.errors import InvalidInput
+from contact_core.geometry.exact_geodesics import log_map
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeField:
+    """Distances over a surface from a stroke.
+
+    radius: of the brush, surface units. reach: how far distances are exact; beyond the radius by 1.5 mean edges, so
+    that the rim may be interpolated inside a face. distances: (n,) per vertex, inf beyond the reach. changed: (k,)
+    the vertices that the last extension lowered, which is all that a front end uploads.
+    """
+
+    mesh: TriangleMesh
+    radius: float
+    reach: float
+    distances: FloatArray
+    changed: IntArray
+
+    @classmethod
+    def begun(cls, mesh: TriangleMesh, radius: float) -> StrokeField:
+        """The field of a stroke that has touched nothing. Raises InvalidInput for a radius that is not positive."""
+        if not 0.0 < radius < np.inf:
+            raise InvalidInput(f"the radius of a stroke must be a positive number, but got {radius}.")
+        empty = np.full(len(mesh.points), np.inf)
+        empty.setflags(write=False)
+        return cls(mesh, radius, radius + 1.5 * _mean_edge(mesh), empty, np.zeros(0, np.int64))
+
+    def extended(self, points: SurfacePoints) -> StrokeField:
+        """The field after the pointer passed over further points, at the cost of those alone.
+
+        In whatever batches and order points come, the distances are those of all of them together.
+        """
+        if not len(points):
+            return replace(self, changed=np.zeros(0, np.int64))
+        used, tree = _vertices(self.mesh)
+        around = tree.query_ball_point(points.positions(self.mesh), self.reach * (1.0 + 1e-9))
+        near = used[np.unique(np.concatenate([np.asarray(some, np.int64) for some in around]))]
+        if not len(near):
+            return replace(self, changed=near)
+        targets = SurfacePoints.at_vertices(self.mesh, near)
+        distance = log_map(self.mesh, points, targets, max_distance=self.reach).distance
+        lower = (distance < self.distances[near]) & (distance <= self.reach)
+        distances = self.distances.copy()
+        distances[near[lower]] = distance[lower]
+        distances.setflags(write=False)
+        return replace(self, distances=distances, changed=frozen(near[lower], np.int64, (None,), "changed"))
+
+    def covered(self) -> IntArray:
+        """The vertices (k,) within the radius of the stroke."""
+        return np.flatnonzero(self.distances <= self.radius)
+
+
+def _mean_edge(mesh: TriangleMesh) -> float:
+    """The mean length of the first edges of faces, surface units; kept with the mesh."""
+    if "mean edge" not in mesh.kept:
+        ends = mesh.points[mesh.faces[:, :2]]
+        mesh.kept["mean edge"] = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean()) if len(ends) else 0.0
+    return float(mesh.kept["mean edge"])
+
+
+def _vertices(mesh: TriangleMesh) -> tuple[IntArray, Any]:
+    """The vertices that faces use and a tree of them; kept with the mesh."""
+    if "vertex tree" not in mesh.kept:
+        from scipy.spatial import cKDTree
+
+        used = np.unique(mesh.faces)
+        mesh.kept["vertex tree"] = used, cKDTree(mesh.points[used])
+    used, tree = mesh.kept["vertex tree"]
+    return used, tree
