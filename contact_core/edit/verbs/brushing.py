@@ -13,6 +13,7 @@ from contact_core.document.document import Color
 from contact_core.edit.verbs.painting import PaintingVerbs
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.exact_geodesics import log_map
+from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.settings import configured
 
@@ -32,6 +33,9 @@ class BrushVerbs(PaintingVerbs):
         patch: str,
         *gestures: BrushGesture,
         surface: str | None = None,
+        at: Any = None,
+        radius: float = 0.0,
+        spacing: float = 0.0,
         axis: SurfacePoints | None = None,
         generator: str | AxisGenerator | None = None,
         color: Color | None = None,
@@ -41,7 +45,10 @@ class BrushVerbs(PaintingVerbs):
 
         brush: a name, or the brush itself; within a stroke, where no plugin is looked for, only that. surface,
         axis, generator, color: of a new patch, as for `paint`. Erased is what lies nearer to a point of a mark,
-        over the surface, than the mark's points lie apart. settings: of the brush, such as falloff="smooth".
+        over the surface, than the mark's points lie apart. at: in place of gestures, where the brush passes:
+        surface points, or positions (k, 3) in surface space that are moved to the closest points of the surface.
+        radius, spacing: of that gesture, in surface units; 0 leaves the choice to the brush. settings: the brush's
+        own, such as falloff="smooth".
         """
         if isinstance(brush, str):
             tool = self.named_brush(brush, **settings)
@@ -50,6 +57,8 @@ class BrushVerbs(PaintingVerbs):
         where = self.document.patches[patch].surface if patch in self.document.patches else surface
         if where is None:
             raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")
+        if at is not None:
+            gestures += (self._gesture(where, at, radius, spacing),)
         if not gestures:
             raise InvalidInput(f"the brush {tool.name!r} needs a gesture or several, but none came.")
         mesh = self.mesh(where)
@@ -68,6 +77,13 @@ class BrushVerbs(PaintingVerbs):
         return self.paint(
             patch, points, surface=where, axis=axis, generator=generator, strength=strength, color=color
         )
+
+    def _gesture(self, surface: str, at: Any, radius: float, spacing: float) -> BrushGesture:
+        mesh = self.mesh(surface)
+        if not isinstance(at, SurfacePoints):
+            at = Locator.of(mesh).closest(np.asarray(at, float).reshape(-1, 3)).points
+        self.check_points(surface, at)
+        return BrushGesture(mesh, at, radius=radius, spacing=spacing)
 
 
 def _covered(points: SurfacePoints, mark: BrushMark, gesture: BrushGesture) -> BoolArray:
