@@ -35,7 +35,7 @@ class Scene:
 def cast(mesh: TriangleMesh, origins: FloatArray, direction: FloatArray) -> SurfacePoints:
     """Where rays along one direction leave the mesh; rays that miss are left out."""
     hits = Locator.of(mesh).cast(origins, np.broadcast_to(direction, origins.shape))
-    return hits.points()
+    return hits.points[hits.found]
 
 
 def rig_of(name: str) -> Rig:

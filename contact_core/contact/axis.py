@@ -61,12 +61,12 @@ def draw_axis(
 ) -> tuple[AxisShape, Axis]:
     """The axis through picked points (k >= 1), joined by shortest geodesics.
 
-    dense: every edge crossing on the way becomes an axis point, which spreads the anchors of patch points evenly;
+    dense: every edge crossing on its path becomes an axis point, which spreads the anchors of patch points evenly;
     otherwise only the picks and the saddle vertices that a geodesic bends round. One pick needs a heading (unit
     complex in its tangent frame). Repeated picks are taken once. Raises InvalidInput for picks not connected.
     """
     if not len(picks):
-        raise InvalidInput("an axis needs at least one point, but none came.")
+        raise InvalidInput("an axis needs at least one point, but got none.")
     lengths: list[float] = []
     turns: list[float] = []  # at the start of each segment
     start, arrived, heading_at_start = picks[0], None, heading
@@ -134,7 +134,7 @@ def root_from_point(
 ) -> tuple[Root, float]:
     """The root from which the axis passes its point `index` at `point` with `tangent` there.
 
-    Walks the axis backwards. Also answers the length that a boundary cut off; unless that is 0, the root lies at
+    Walks the axis backwards. Also returns the length that a boundary cut off; unless that is 0, the root lies at
     the boundary and the axis does not pass the point.
     """
     if index == 0:
@@ -162,9 +162,9 @@ def _segments(
     knots = np.concatenate([[abs(complex(first[0]))], rest])  # lengths of the straight legs
     if not dense:
         return knots.tolist(), turns.tolist()
-    way = trace_chains(mesh, start, first, np.array([0, len(rest)]), turns, rest, polyline=True)
-    assert way.polylines is not None
-    steps = np.linalg.norm(np.diff(way.polylines[0].positions(mesh), axis=0), axis=1)
+    path = trace_chains(mesh, start, first, np.array([0, len(rest)]), turns, rest, polyline=True)
+    assert path.polylines is not None
+    steps = np.linalg.norm(np.diff(path.polylines[0].positions(mesh), axis=0), axis=1)
     total, bends = float(knots.sum()), np.cumsum(knots)
     marks = np.cumsum(steps)[:-1]  # distances of the crossings from the start
     near = 1e-9 * max(total, 1e-300)

@@ -32,7 +32,7 @@ class AxisRequest:
 class AxisGenerator(Protocol):
     """Chooses an axis for a patch.
 
-    The answer is an ordered sequence of at least two distinct points of the mesh, on the component that holds
+    The result is an ordered sequence of at least two distinct points of the mesh, on the component that holds
     the patch. Neighbours are joined by shortest geodesics afterwards (`contact.axis.draw_axis`), so two points
     are enough for a straight axis. It depends on the set of patch points and not on their order, and it moves
     with the mesh under rigid motion. Raises InvalidInput with a sentence where a patch has no axis.

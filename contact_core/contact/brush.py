@@ -69,7 +69,7 @@ class BrushMark:
     def __post_init__(self) -> None:
         object.__setattr__(self, "strength", frozen(self.strength, float, (len(self.points),), "strength"))
         if len(self.strength) and not (self.strength.min() >= 0.0 and self.strength.max() <= 1.0):
-            raise InvalidInput(f"the strength of a brush lies in 0..1, but {float(self.strength.max())} came.")
+            raise InvalidInput(f"the strength of a brush lies in 0..1, but got {float(self.strength.max())}.")
 
 
 @runtime_checkable

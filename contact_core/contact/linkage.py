@@ -1,4 +1,4 @@
-"""Hierarchy: a child hangs on a parent by a geodesic between two of their axis points.
+"""Hierarchy: a child is linked to its parent by a geodesic between two of their axis points.
 
 The connected axes act as one axis with branches (paper, Hierarchical Composition): the link stores the geodesic's
 angles relative to the parent's tangent, and the child's tangent relative to the geodesic's end.
@@ -32,7 +32,7 @@ def link_to(
     Raises InvalidInput when the two are not connected or the parent has no such axis point.
     """
     if not 0 <= parent_point < len(parent_axis):
-        raise InvalidInput(f"the axis of {parent!r} has {len(parent_axis)} points, but point {parent_point} came.")
+        raise InvalidInput(f"the axis of {parent!r} has {len(parent_axis)} points, but got point {parent_point}.")
     log = log_map(mesh, parent_axis.points[parent_point], point)
     if log.anchor[0] < 0:
         raise InvalidInput(f"the child is not connected to {parent!r} over the surface.")

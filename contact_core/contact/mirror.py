@@ -20,7 +20,7 @@ def reflected(vectors: FloatArray, normal: Any, offset: float = 0.0) -> FloatArr
     largest = float(np.abs(n).max())
     length = largest * float(np.linalg.norm(n / (largest or 1.0)))
     if not 0.0 < length < np.inf:
-        raise InvalidInput(f"the normal of a mirror plane is a direction, but {n.tolist()} came.")
+        raise InvalidInput(f"the normal of a mirror plane is a direction, but got {n.tolist()}.")
     n = n / length
     return np.asarray(vectors - 2.0 * np.outer(vectors @ n - offset / length, n))
 

@@ -18,10 +18,11 @@ MOST_STRETCH = 4.0  # of one axis against the other
 
 
 def correspond(first: PatchShape, second: PatchShape, *, opposed: bool = True) -> IntArray:
-    """(n,) for each point of `first` the point of `second` that answers it in axis coordinates.
+    """(n,) for each point of `first` the point of `second` that corresponds to it in axis coordinates.
 
     opposed: the patches face each other, so left of one axis is right of the other. Raises InvalidInput where the
-    two do not match: one has no axis to speak of, the axes differ in length too much, or regions have no answer.
+    two do not match: one has no axis to speak of, the axes differ in length too much, or regions have no
+    counterpart.
     """
     a, b = axis_coordinates(first), axis_coordinates(second)
     lengths = first.axis.length * first.meters_per_unit, second.axis.length * second.meters_per_unit

@@ -24,9 +24,12 @@ from contact_core.geometry.tracing import trace_chains
 
 @dataclass(frozen=True, eq=False)
 class PatchPoints:
-    """A reconstructed patch. points: n. remaining: (n,) length that a boundary kept from being walked, on the axis
-    or from it; such points lie on the boundary, and are reported rather than dropped. headings: (n,) unit complex,
-    the direction in which each path from the axis ends (1 where it has no length)."""
+    """A reconstructed patch of n points.
+
+    remaining: (n,) length (surface units) that could not be traced because a boundary stopped the axis or the
+    geodesic from it; such points lie on the boundary and are reported, not dropped. headings: (n,) unit complex,
+    the direction in which each geodesic from the axis arrives (1 where it has no length).
+    """
 
     points: SurfacePoints
     remaining: FloatArray
@@ -57,9 +60,9 @@ def parameterize_patch(
 ) -> PatchCoordinates:
     """Coordinates of n points relative to an axis (paper: Algorithm 2, z = r theta / T).
 
-    Each point is anchored at its closest axis point, or at anchors (n,) chosen by hand (-1: the closest).
-    shape, mirrored, unit: how `axis` was reconstructed; the coordinates are those before scaling and mirroring.
-    engine: who measures; the points come back to where they are as nearly as it is exact.
+    Each point is anchored at its closest axis point, or at the axis point that anchors (n,) name (-1: the closest).
+    shape, mirrored, unit: those that `axis` was reconstructed with; the coordinates returned are free of their
+    scaling and mirroring. engine: measures the geodesics; reconstruction is as exact as the engine.
     Raises InvalidInput naming the first point that no axis point reaches.
     """
     if anchors is None:
@@ -99,7 +102,7 @@ def points_from_axis(
     mirrored: bool = False,
     unit: float = 1.0,
 ) -> PatchPoints:
-    """The points that hang on a reconstructed axis: one trace each, all in one batch."""
+    """The points of a patch whose axis is reconstructed: one geodesic from the axis each, all in one batch."""
     legs, angles, lengths = patch_chains(coordinates, axis_shape, mirrored=mirrored, unit=unit)
     anchors = coordinates.anchors
     trace = trace_chains(
@@ -111,8 +114,8 @@ def points_from_axis(
 def patch_chains(
     coordinates: PatchCoordinates, axis_shape: AxisShape, *, mirrored: bool, unit: float
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """The walks from the anchors to n points: first legs (n,) relative to the anchors' tangents, then the angles
-    and lengths of the legs after them (by `coordinates.chain_starts`)."""
+    """The geodesics from the anchors to n points: first legs (n,) relative to the anchors' tangents, then turning
+    angles and lengths of the legs that follow (rows by `coordinates.chain_starts`)."""
     legs, lengths = scaled_legs(coordinates, axis_shape.along * unit, axis_shape.spread * unit)
     angles = coordinates.chain_angles
     return (np.conj(legs), -angles, lengths) if mirrored else (legs, angles, lengths)

@@ -1,4 +1,4 @@
-"""Where a patch sits: at a root of its own, or hanging on a parent patch by a geodesic.
+"""Where a patch lies: at a root of its own, or as the child of another patch, linked to it by a geodesic.
 
 Plain numbers, no arrays: a placement is compared, hashed and stored as it is.
 """
@@ -29,11 +29,11 @@ class Root:
         length = abs(self.heading)
         total = math.fsum(self.barycentric)
         if not 1e-9 < length < 1e9:
-            raise InvalidInput(f"a heading is a unit complex number, but {self.heading} came.")
+            raise InvalidInput(f"a heading is a unit complex number, but got {self.heading}.")
         if len(self.barycentric) != 3 or not min(self.barycentric) >= -1e-6 or not abs(total - 1.0) <= 1e-6:
             raise InvalidInput(f"barycentric coordinates are non-negative and sum to 1; got {self.barycentric}.")
         if self.face < 0:
-            raise InvalidInput(f"a face index is not negative, but {self.face} came.")
+            raise InvalidInput(f"a face index is not negative, but got {self.face}.")
         if abs(length - 1.0) > 1e-15:
             object.__setattr__(self, "heading", self.heading / length)
 
@@ -41,7 +41,7 @@ class Root:
     def at(cls, point: SurfacePoints, heading: complex) -> Root:
         """From a batch of one point. Raises InvalidInput for any other number of points."""
         if len(point) != 1:
-            raise InvalidInput(f"a root is one surface point, but {len(point)} came.")
+            raise InvalidInput(f"a root is one surface point, but got {len(point)}.")
         a, b, c = point.barycentric[0].tolist()
         return cls(int(point.faces[0]), (a, b, c), complex(heading))
 
@@ -76,7 +76,7 @@ class Link:
     def __post_init__(self) -> None:
         if len(self.lengths) != len(self.turns) + 1:
             raise InvalidInput(
-                f"a link of {len(self.turns)} turns has one length more, but {len(self.lengths)} lengths came."
+                f"a link of {len(self.turns)} turns has one length more, but got {len(self.lengths)} lengths."
             )
         if not all(math.isfinite(x) for x in (self.direction, self.heading, *self.lengths, *self.turns)):
             raise InvalidInput("the angles and lengths of a link are finite numbers.")

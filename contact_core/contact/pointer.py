@@ -62,10 +62,12 @@ def met(gesture: BrushGesture, screen: FloatArray) -> Met:
     origins, directions = gesture.rays(screen)
     seen = gesture.seen or gesture.mesh
     hits = Locator.of(seen).cast(origins, directions)
-    hit = hits.hit
+    hit = hits.found
     for other in gesture.before:
         hit = hit & (hits.distance <= Locator.of(other).cast(origins, directions).distance)
-    points = SurfacePoints(np.where(hit, hits.faces, 0), np.where(hit[:, None], hits.barycentric, [1.0, 0.0, 0.0]))
+    points = SurfacePoints(
+        np.where(hit, hits.points.faces, 0), np.where(hit[:, None], hits.points.barycentric, [1.0, 0.0, 0.0])
+    )
     at = np.concatenate([points.positions(gesture.mesh), points.positions(seen)], axis=1)
     return Met(hit, points, np.where(hit[:, None], at, 0.0))
 

@@ -22,7 +22,7 @@ def touching_vertices(
     facing: only walls that face the vertex count, so that nothing reaches through a cup. Raises InvalidInput.
     """
     if not 0.0 < distance < np.inf:
-        raise InvalidInput(f"contacts lie within a positive distance, but {distance} came.")
+        raise InvalidInput(f"contacts lie within a positive distance, but got {distance}.")
     matrix = np.eye(4) if other_from_posed is None else np.asarray(other_from_posed, dtype=float).reshape(4, 4)
     points = transform_points(matrix, posed.points)
     normals = posed.vertex_normals @ matrix[:3, :3].T
@@ -36,7 +36,7 @@ def touching_vertices(
 
 
 def patches_of_vertices(mesh: TriangleMesh, vertices: IntArray, smallest: int = 1) -> list[IntArray]:
-    """Vertices split into parts that hang together along edges of the mesh, the largest first."""
+    """Connected components of vertices along edges of the mesh, the largest first."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -34,9 +34,9 @@ class AxisShape:
         angles = frozen(self.turning_angles, np.float64, (max(len(lengths) - 1, 0),), "turning_angles of an axis")
         object.__setattr__(self, "turning_angles", angles)
         if len(lengths) and lengths.min() < 0.0:
-            raise InvalidInput(f"the lengths of an axis are not negative, but {lengths.min()} came.")
+            raise InvalidInput(f"the lengths of an axis are not negative, but got {lengths.min()}.")
         if not (0.0 < self.along < np.inf and 0.0 < self.spread < np.inf):
-            raise InvalidInput(f"along and spread are positive factors, but {self.along} and {self.spread} came.")
+            raise InvalidInput(f"along and spread are positive factors, but got {self.along} and {self.spread}.")
 
     @property
     def point_count(self) -> int:
@@ -64,7 +64,7 @@ class AxisShape:
         """Raises InvalidInput unless the axis can bend at `point`."""
         if not 1 <= point <= len(self.turning_angles):
             inner = f"1..{len(self.turning_angles)}" if len(self.turning_angles) else "none"
-            raise InvalidInput(f"an axis bends at its interior points ({inner}), but point {point} came.")
+            raise InvalidInput(f"an axis bends at its interior points ({inner}), but got point {point}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +144,14 @@ class PatchShape:
         weights = frozen(self.weights, np.float64, (len(self.coordinates),), "weights of a patch")
         object.__setattr__(self, "weights", weights)
         if len(weights) and weights.min() < 0.0:
-            raise InvalidInput(f"the weights of a patch are not negative, but {weights.min()} came.")
+            raise InvalidInput(f"the weights of a patch are not negative, but got {weights.min()}.")
         anchors = self.coordinates.anchors
         if len(anchors) and anchors.max() >= self.axis.point_count:
             raise InvalidInput(
                 f"anchors index the {self.axis.point_count} axis points, but {int(anchors.max())} came among them."
             )
         if not 0.0 < self.meters_per_unit < np.inf:
-            raise InvalidInput(f"meters_per_unit is a positive number, but {self.meters_per_unit} came.")
+            raise InvalidInput(f"meters_per_unit is a positive number, but got {self.meters_per_unit}.")
 
     def __len__(self) -> int:
         return len(self.coordinates)

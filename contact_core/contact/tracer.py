@@ -1,7 +1,8 @@
-"""Several patches on one surface, traced together: for who moves them again and again.
+"""Reconstructs several patches on one mesh in one batch, for callers that move them again and again (a solver).
 
-`reconstruct_patch` takes each apart anew and walks it on its own. Here what does not change with the roots is laid
-out once, and a trace is two batches of walks, however many patches there are; the points are bitwise the same.
+`reconstruct_patch` prepares and traces one patch per call. A `PatchTracer` prepares everything that does not depend
+on the roots once; each `trace` is then two batches of geodesics, one for all axes and one for all points, however
+many patches there are. The points are bitwise those of `reconstruct_patch`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from contact_core.geometry.tracing import trace_chains
 
 @dataclass(frozen=True, eq=False)
 class ShapedPatch:
-    """A patch but for its root, as `reconstruct_patch` takes it."""
+    """A patch without its root: the other arguments of `reconstruct_patch`."""
 
     shape: PatchShape
     axis: AxisShape | None = None
@@ -32,17 +33,21 @@ class ShapedPatch:
 
 
 class TracedPatches(NamedTuple):
-    """The points of all patches, one patch below the other. headings: (k,) unit complex, the direction in which
-    each path ends; that of the axis where the point lies on it."""
+    """The points (k) of all patches, concatenated in the order of the patches.
+
+    headings: (k,) unit complex, the direction in which the geodesic from the axis arrives at each point, in the
+    point's tangent frame; at a point of the axis itself, the direction of the axis.
+    """
 
     points: SurfacePoints
     headings: ComplexArray
 
 
 class _Walks(NamedTuple):
-    """Walks of all patches, one below the other. origin: (w,) where each starts, among points known before.
+    """Geodesics of all patches, concatenated. origin: (w,) index of each one's start among the points known so far.
 
-    legs: (w,) complex first legs relative to the tangent there. offsets, turns, lengths: the legs after.
+    legs: (w,) complex first legs relative to the tangent at the start. offsets, turns, lengths: the legs that
+    follow, as `trace_chains` takes them.
     """
 
     origin: IntArray
@@ -53,7 +58,7 @@ class _Walks(NamedTuple):
 
 
 class PatchTracer:
-    """Patches on a mesh, ready to be traced from any roots. patch_of_point: (k,) which patch each point is of."""
+    """Patches on a mesh, prepared to be traced from any roots. patch_of_point: (k,) index of each point's patch."""
 
     def __init__(self, mesh: TriangleMesh, patches: Sequence[ShapedPatch]) -> None:
         self.mesh = mesh
@@ -61,11 +66,13 @@ class PatchTracer:
         self.patch_of_point: IntArray = np.repeat(np.arange(len(patches)), counts)
         axes = [axis_chains(p.axis or p.shape.axis, mirrored=p.mirrored, unit=p.unit) for p in patches]
         self._bends = _joined([bends for _, bends in axes], complex)
-        self._axis_walks = _below(
+        self._axis_walks = _concatenated(
             (np.full(len(bends), i), chains.first.astype(complex), chains.offsets, chains.turns, chains.lengths)
             for i, (chains, bends) in enumerate(axes)
         )
-        ends = np.cumsum([0, *(len(bends) for _, bends in axes)]) + len(patches)  # of the axes, behind all roots
+        ends = np.cumsum([0, *(len(bends) for _, bends in axes)]) + len(
+            patches
+        )  # where each axis starts, after all roots
         parts = []
         for i, patch in enumerate(patches):
             coordinates = patch.shape.coordinates
@@ -75,10 +82,10 @@ class PatchTracer:
             )
             origin = np.where(anchors == 0, i, ends[i] + anchors - 1)
             parts.append((origin, legs, coordinates.chain_starts, turns, lengths))
-        self._point_walks = _below(parts)
+        self._point_walks = _concatenated(parts)
 
     def trace(self, roots: SurfacePoints, headings: ComplexArray) -> TracedPatches:
-        """The points with the patches at roots (n,), their axes heading along unit complex numbers (n,)."""
+        """The points of n patches at roots (n), whose axes start along headings (n,), unit complex."""
         axes, walks = self._axis_walks, self._point_walks
         walked = trace_chains(
             self.mesh, roots[axes.origin], axes.legs * headings[axes.origin], axes.offsets, axes.turns, axes.lengths
@@ -92,10 +99,10 @@ class PatchTracer:
         return TracedPatches(ended.points, np.where(walks.legs == 0.0, tangents, ended.headings))
 
 
-def _below(
+def _concatenated(
     parts: Iterable[tuple[IntArray, ComplexArray, IntArray, FloatArray, FloatArray]],
 ) -> _Walks:
-    """Walks of several patches, one below the other."""
+    """The geodesics of several patches, concatenated."""
     rows = list(parts)
     counts = [np.diff(offsets) for _, _, offsets, _, _ in rows]
     offsets = np.concatenate([[0], np.cumsum(_joined(counts, np.int64))]).astype(np.int64)

@@ -18,7 +18,7 @@ def transported(mesh: TriangleMesh, root: Root, to: SurfacePoints) -> Root:
     direction does not, so the turns are taken off again. Raises InvalidInput where no path leads there.
     """
     if len(to) != 1:
-        raise InvalidInput(f"a patch is moved to one surface point, but {len(to)} came.")
+        raise InvalidInput(f"a patch is moved to one surface point, but got {len(to)}.")
     log = log_map(mesh, root.point(), to)
     if log.anchor[0] < 0:
         raise InvalidInput("no path on the surface leads from the patch to that point; transfer it instead.")

@@ -1,4 +1,4 @@
-"""A signed distance field on a grid: how deep a point is inside an object, and which way leads out.
+"""A signed distance field on a grid: how deep a point is inside an object, and in which direction out lies.
 
 Negative inside. In a band of two cells round the surface a node's distance is exact (closest point on the
 triangles) and its sign is the generalised winding number's (> 0.5 is inside), so small holes and self-overlaps

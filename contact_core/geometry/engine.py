@@ -1,4 +1,4 @@
-"""The slot for geodesic engines: what an engine answers, and the exact engine of this package as the default.
+"""The slot for geodesic engines: what an engine returns, and the exact engine of this package as the default.
 
 A plugin registers another engine through `contact_geodesic_engines`, and `Session(engine=NAME)` measures the
 coordinates of painted points with it. What a document holds is walked again by the exact tracer alone, whoever
@@ -45,8 +45,8 @@ class LogMapResult(Protocol):
 
 @runtime_checkable
 class ChainedLogMapResult(LogMapResult, Protocol):
-    """A log map that also knows how its ways bend round saddle vertices, as `LogMap` says. An engine answers this
-    where it can; without chains a way that bends is taken for straight, and misses its target behind the bend."""
+    """A log map that also knows how its paths bend round saddle vertices, as `LogMap` says. An engine returns this
+    where it can; without chains a path that bends is taken for straight, and misses its target behind the bend."""
 
     @property
     def first_leg(self) -> ComplexArray: ...

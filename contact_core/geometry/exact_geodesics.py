@@ -23,19 +23,19 @@ from contact_core.geometry.workspace import Workspace
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LogMap:
-    """Shortest ways from the nearest of several sources to each of k targets.
+    """Shortest paths from the nearest of several sources to each of k targets.
 
-    A shortest way runs straight until it bends round a saddle vertex or a reflex vertex of the boundary, so it is a
-    chain: a first leg, then legs that turn and run on. `trace_chains` walks it again and ends at the target.
+    A shortest path runs straight until it bends round a saddle vertex or a reflex vertex of the boundary, so it is
+    a chain: a first leg, then legs that turn and run on. `trace_chains` walks it again and ends at the target.
 
     anchor: (k,) index of the nearest source, -1 where none is in reach.
-    distance: (k,) length of the whole way, inf where none.
+    distance: (k,) length of the whole path, inf where none.
     coordinates: (k,) complex; absolute value = distance, argument = initial direction in the source's tangent
     frame.
     headings: (k,) unit complex, forward direction at the target in its tangent frame (1 where nothing is walked).
-    first_leg: (k,) complex tangent vector of the straight beginning; equal to coordinates where the way never
+    first_leg: (k,) complex tangent vector of the straight beginning; equal to coordinates where the path never
     bends.
-    offsets: (k + 1,) rows offsets[i]:offsets[i + 1] of the two below are the further legs of way i.
+    offsets: (k + 1,) rows offsets[i]:offsets[i + 1] of the two below are the further legs of path i.
     turning_angles, lengths: (c,) radians counter-clockwise from straight on (rescaled at the vertex), surface
     units.
     pops: windows and vertices that the search took from its heap: the work done.
@@ -97,7 +97,7 @@ def log_map(
     require_on_surface(topology, sources, "sources")
     require_on_surface(topology, targets, "targets")
     if not len(sources):
-        raise InvalidInput("a log map needs at least one source, but none came.")
+        raise InvalidInput("a log map needs at least one source, but got none.")
     count = len(targets)
     anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
     distance, headings = np.empty(count), np.empty(count, np.complex128)
@@ -141,15 +141,15 @@ def exact_geodesic(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoints)
     """The shortest path between two points (batches of one). Raises InvalidInput where no path joins them."""
     for name, point in (("start", start), ("end", end)):
         if len(point) != 1:
-            raise InvalidInput(f"a geodesic has one {name} point, but {len(point)} came.")
+            raise InvalidInput(f"a geodesic has one {name} point, but got {len(point)}.")
     log = log_map(mesh, start, end)
     if log.anchor[0] < 0:
         raise InvalidInput("no path joins the two points: they lie on parts of the surface that are not connected.")
-    way = trace_chains(mesh, start, log.first_leg, log.offsets, log.turning_angles, log.lengths, polyline=True)
-    assert way.polylines is not None
+    path = trace_chains(mesh, start, log.first_leg, log.offsets, log.turning_angles, log.lengths, polyline=True)
+    assert path.polylines is not None
     leg = complex(log.first_leg[0])
     heading = leg / abs(leg) if leg else 1.0 + 0.0j
-    return Geodesic(way.polylines[0], float(log.distance[0]), heading, complex(log.headings[0]), log)
+    return Geodesic(path.polylines[0], float(log.distance[0]), heading, complex(log.headings[0]), log)
 
 
 def parallel_transport(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoints, vectors: Any) -> ComplexArray:

@@ -1,9 +1,9 @@
 """Faces without area: three distinct corners on one line, with angles of rounding noise.
 
-A search cannot see through a flat face from its middle corner: light from there leaves through the one point of the
-long edge that the corner lies on. So where it matters the edges of flat faces are made a little longer. Then every
-triangle has angles, both sides of an edge agree, and searches and walks see one surface.
-Source: intrinsic mollification (Sharp and Crane 2020, section 4.5), only where it is needed.
+A search cannot see through a flat face from its middle corner: a window from there leaves through the one point of
+the long edge that the corner lies on. So where it matters the edges of flat faces are made a little longer. Then
+every triangle has angles, both sides of an edge agree, and searches and walks see one surface. Source: intrinsic
+mollification (Sharp and Crane 2020, section 4.5), only where it is needed.
 """
 
 from __future__ import annotations

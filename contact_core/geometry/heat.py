@@ -44,9 +44,11 @@ def heat_distance(mesh: TriangleMesh, faces: Any, sources: Any, *, smoothing: fl
     region = np.unique(frozen(faces, np.int64, (None,), "faces"))
     source = np.unique(frozen(sources, np.int64, (None,), "sources"))
     if not len(region) or region[0] < 0 or region[-1] >= len(mesh.faces):
-        raise InvalidInput(f"the region needs face indices in 0..{len(mesh.faces) - 1}, but {region[:3]} ... came.")
+        raise InvalidInput(
+            f"the region needs face indices in 0..{len(mesh.faces) - 1}, but got {region[:3].tolist()} ..."
+        )
     if not (np.isfinite(smoothing) and smoothing > 0):
-        raise InvalidInput(f"smoothing must be positive, but {smoothing} came.")
+        raise InvalidInput(f"smoothing must be positive, but got {smoothing}.")
     region = region[mesh.face_areas[region] > 0.0]
     vertices, local = np.unique(mesh.faces[region], return_inverse=True)
     triangles = local.reshape(-1, 3)  # (r, 3) indices into vertices

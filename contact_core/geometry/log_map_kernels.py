@@ -1,4 +1,4 @@
-"""The query of the log map: sources light their faces, windows spread, targets listen.
+"""The query of the log map: windows start at the sources and propagate; targets are updated.
 
 Targets inside faces and on edges wait in a list of one face: every window that enters it tests them, and at the end
 the three corners of the face are candidates too. Targets on vertices read the vertex.
@@ -64,15 +64,15 @@ X, Y, RANK, DISTANCE, ZX, ZY, DX, DY = (constant(i) for i in (0, 1, 6, 7, 8, 9, 
 # Columns of target_integers (t, 7)
 ON, ELEMENT, NEXT, TARGET_ROOT, TARGET_WEDGE, ARRIVAL, TOUCHES = (constant(i) for i in range(7))
 
-# A way that only grazes its window is preferred to another one if it is shorter by more than this: it may in truth
-# be the way round the vertex that it grazes.
+# A path that only grazes its window is preferred to another one if it is shorter by more than this: it may in truth
+# be the path round the vertex that it grazes.
 GRAZING_RANK = 1.0 + 1e-11
 CHECK_EVERY = constant(64)  # pops, at least, between two looks at the targets
 
 
 @kernel
 def list_targets(ends: Points, mesh: Halfedges, labels: Labels, targets: Targets) -> int:
-    """Find the places of targets and hang those inside faces and on edges into the list of a face.
+    """Find the places of targets and enter those inside faces and on edges in the list of a face.
 
     Returns -1, or a halfedge of a face without three corners that a target lies in.
     """
@@ -113,7 +113,7 @@ def update_target(t: int, rank: float, path: Path, targets: Targets) -> None:
 
 @inlined
 def update_targets(w: int, mesh: Halfedges, labels: Labels, windows: Windows, targets: Targets) -> None:
-    """Offer the targets of the face that window w enters their straight ways to its root."""
+    """Update the targets of the face that window w enters with the straight legs from its root."""
     h = windows.integers[w, HALFEDGE]
     f, k = h // 3, h % 3
     if targets.waiting[f, 0] != labels.epoch:
@@ -168,7 +168,7 @@ def host_face(t: int, targets: Targets) -> int:
 
 @kernel
 def update_targets_beside(base: int, x: float, y: float, root: int, labels: Labels, targets: Targets) -> None:
-    """Offer the targets of the face of `base` the straight way from the source at (x, y) in its frame."""
+    """Update the targets of the face of `base` with the straight legs from the source at (x, y) in its frame."""
     f, k = base // 3, base % 3
     t = int(targets.waiting[f, 1]) if targets.waiting[f, 0] == labels.epoch else -1
     while t >= 0:
@@ -190,7 +190,7 @@ def seed(
     queue: Queue,
     targets: Targets,
 ) -> tuple[int, int]:
-    """Light all faces at source s; returns (status, blocked element)."""
+    """Start windows into all faces at source s; returns (status, blocked element)."""
     on, element, x, y = place_of(sources, s, mesh)
     if on == ON_NOTHING:
         return MET_BLOCKED_EDGE, element

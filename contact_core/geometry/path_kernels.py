@@ -1,4 +1,4 @@
-"""Reading ways off a finished search: distances, headings, and chains of straight legs.
+"""Reading paths off a finished search: distances, headings, and chains of straight legs.
 
 A straight leg may pass a vertex exactly, as many do on a lattice. Round a saddle a walk would part the angles there
 and end elsewhere, so the leg is cut in two at that vertex, and both can be walked. Legs that touch the rim of their
@@ -60,7 +60,7 @@ def bend_met(
     labels: Labels,
     line: Points,
 ) -> tuple[int, int, float, float]:
-    """The last vertex that bends paths on the last leg of a way, walked back from its end along the unit vector
+    """The last vertex that bends paths on the last leg of a path, walked back from its end along the unit vector
     (bx, by): (vertex or -1, corner, leg from the vertex to the end in the corner's frame)."""
     status, corner, miss, _, cos, sin, before, _ = walk(
         on, element, x, y, length * bx, length * by, False, True, 0, mesh, line
@@ -76,7 +76,7 @@ def bend_met(
 
 @kernel
 def bend_path_to_vertex(v: int, mesh: Halfedges, labels: Labels, line: Points) -> None:
-    """Bend the last leg of the way to v at the vertex that it passes, if it may pass one."""
+    """Bend the last leg of the path to v at the vertex that it passes, if it may pass one."""
     if labels.origin[v, 3] == 0:
         return
     labels.origin[v, 3] = 0
@@ -110,7 +110,7 @@ def read_targets(
     targets: Targets,
     line: Points,
 ) -> int:
-    """Settle the way of every target; write anchor, distance, headings (t, 2) and offsets of the chains (t + 1,).
+    """Settle the path of every target; write anchor, distance, headings (t, 2) and offsets of the chains (t + 1,).
 
     Afterwards target_integers hold root and wedge, and target_floats ZX, ZY the last leg, for vertices too.
     """
@@ -137,11 +137,11 @@ def read_targets(
             base = 3 * host_face(t, targets)
             for k in range(3):
                 x, y = row[X + 2 * k], row[Y + 2 * k]
-                way = distance_at(mesh.tail[base + k], labels)
-                if 0.0 < way < math.inf:
-                    way += norm(x, y)
-                    path = Path(way, mesh.tail[base + k], base + k, x, y, base + k, x, y, INSIDE)
-                    update_target(t, way, path, targets)
+                length = distance_at(mesh.tail[base + k], labels)
+                if 0.0 < length < math.inf:
+                    length += norm(x, y)
+                    path = Path(length, mesh.tail[base + k], base + k, x, y, base + k, x, y, INSIDE)
+                    update_target(t, length, path, targets)
             distance[t] = row[DISTANCE] if row[RANK] < math.inf else math.inf
             if 0.0 < distance[t] <= limit and distance[t] < math.inf:
                 headings[t, 0], headings[t, 1] = heading_at(

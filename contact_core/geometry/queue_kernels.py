@@ -1,10 +1,10 @@
 """The queue of a search: a heap in order of distance, and a stack of what goes on at once.
 
-Windows leave the heap in order of distance for thrift alone: light from afar meets vertices that nearer light has
-reached, and is dropped. Only vertices need the order, to be final when they cast their shadows. So a window that
-leaves the heap sets a horizon further off by the shortest edge of its face (the last of `keys`), and windows that
-lie within it go on from the stack: one in a hundred comes too early, but most of the heap's work is saved, and a
-child follows its parent while their faces are in the cache (W 1.12 to 0.85 ms). A vertex waits in the heap, so
+Windows leave the heap in order of distance to save work only: a window from afar meets vertices that a nearer one
+has reached, and is dropped. Only vertices need the order, to be final when they cast their shadows. So a window
+that leaves the heap sets a horizon further off by the shortest edge of its face (the last of `keys`), and windows
+that lie within it go on from the stack: one in a hundred comes too early, but most of the heap's work is saved, and
+a child follows its parent while their faces are in the cache (W 1.12 to 0.85 ms). A vertex waits in the heap, so
 that all nearer windows go before it.
 
 `keys` and `items` are both the heap, from their beginning, and `items` the stack, from its end.

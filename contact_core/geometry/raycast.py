@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from contact_core.arrays import BoolArray, FloatArray, IntArray, frozen
+from contact_core.arrays import BoolArray, FloatArray, frozen
 from contact_core.errors import InvalidInput
 from contact_core.geometry import box_kernels, box_tree
 from contact_core.geometry.mesh import TriangleMesh
@@ -25,27 +25,19 @@ from contact_core.geometry.surface_point import SurfacePoints
 
 @dataclass(frozen=True, eq=False)
 class RayHits:
-    """First hits of k rays. faces: (k,), -1 for a miss. barycentric: (k, 3). distance: (k,) in lengths of the
-    given direction vectors, inf for a miss."""
+    """First hits of k rays. points: (k) on the mesh. distance: (k,) in lengths of the given direction vectors.
+    found: (k,), False for a miss (there `points` holds an arbitrary point and distance is inf)."""
 
-    faces: IntArray
-    barycentric: FloatArray
+    points: SurfacePoints
     distance: FloatArray
-
-    @property
-    def hit(self) -> BoolArray:
-        """(k,) which rays hit."""
-        return self.faces >= 0
-
-    def points(self) -> SurfacePoints:
-        """The hits alone, in ray order."""
-        return SurfacePoints(self.faces[self.hit], self.barycentric[self.hit])
+    found: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
 class Closest:
-    """Closest surface points of k queries. points: on the mesh. distance: (k,). found: (k,), False where no
-    face passed the filter within the radius (there `points` holds an arbitrary point and distance is inf)."""
+    """Closest surface points of k queries. points: (k) on the mesh. distance: (k,) surface units. found: (k,),
+    False where no face passed the filter within the radius (there `points` holds an arbitrary point and distance is
+    inf)."""
 
     points: SurfacePoints
     distance: FloatArray
@@ -81,12 +73,15 @@ class Locator:
         """
         origins, directions = _rows(origins, "origins"), _rows(directions, "directions")
         if len(origins) != len(directions):
-            raise InvalidInput(f"rays need as many directions as origins: {len(origins)}, {len(directions)} came.")
+            raise InvalidInput(
+                f"rays need as many directions as origins, but got {len(directions)} for {len(origins)}."
+            )
         zero = ~directions.any(axis=1)
         if zero.any():
             raise InvalidInput(f"directions must not be zero, but that of ray {int(np.argmax(zero))} is.")
         faces, barycentric, distance = box_kernels.cast(self._tree, origins, directions, float(max_distance))
-        return RayHits(faces, barycentric, distance)
+        found = faces >= 0
+        return RayHits(SurfacePoints(np.where(found, faces, 0), barycentric), distance, found)
 
     def closest(
         self, points: Any, *, max_distance: float = np.inf, facing: Any = None, facing_limit: float = -0.3
@@ -99,7 +94,9 @@ class Locator:
         points = _rows(points, "points")
         directions = np.zeros((0, 3)) if facing is None else _rows(facing, "facing")
         if facing is not None and len(directions) != len(points):
-            raise InvalidInput(f"facing needs one direction per point: {len(points)}, {len(directions)} came.")
+            raise InvalidInput(
+                f"facing needs one direction per point, but got {len(directions)} for {len(points)} points."
+            )
         faces, barycentric, distance = box_kernels.closest(
             self._tree, self._normals, points, directions, float(facing_limit), float(max_distance)
         )

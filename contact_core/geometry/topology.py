@@ -54,7 +54,7 @@ class Topology:
         Raises InvalidInput for what is no mesh.
         """
         if not isinstance(mesh, TriangleMesh):
-            raise InvalidInput(f"the mesh must be a TriangleMesh(points, faces), but {type(mesh).__name__} came.")
+            raise InvalidInput(f"the mesh must be a TriangleMesh(points, faces), but got {type(mesh).__name__}.")
         kept = mesh.__dict__.get("_topology")
         if kept is None:
             kept = mesh.__dict__["_topology"] = cls._build(mesh)

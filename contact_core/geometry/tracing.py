@@ -40,7 +40,7 @@ class Trace:
 
     points: (k). headings: (k,) unit complex, forward direction at the end in its tangent frame (1 where nothing was
     walked along a zero vector). remaining: (k,) length left where a boundary stopped the walk, else 0 (surface
-    units). polylines: the ways, when asked for.
+    units). polylines: the paths, when asked for.
     """
 
     points: SurfacePoints
@@ -85,7 +85,7 @@ def trace_chains(
     offsets = _read_only(np.zeros(count + 1, np.int64)) if no_chains else _offsets(offsets, count, lengths)
     if len(turning_angles) != len(lengths):
         raise InvalidInput(
-            f"a chain has one turning angle for each length, but {len(turning_angles)} and {len(lengths)} came."
+            f"a chain has one turning angle for each length, but got {len(turning_angles)} and {len(lengths)}."
         )
     ends = Points(np.empty(count, np.int64), np.empty((count, 3)))
     headings, remaining = np.empty(count, np.complex128), np.empty(count)
@@ -107,8 +107,8 @@ def trace_chains(
         raise _refusal(topology, status, where, element)
     lines = None
     if polyline:
-        way = SurfacePoints.trusted(line.faces[:where], line.barycentric[:where])
-        lines = Polylines(way, _read_only(line_ends[:, 0]), _read_only(line_ends[:, 1]))
+        points = SurfacePoints.trusted(line.faces[:where], line.barycentric[:where])
+        lines = Polylines(points, _read_only(line_ends[:, 0]), _read_only(line_ends[:, 1]))
     return Trace(SurfacePoints.trusted(*ends), _read_only(headings), _read_only(remaining), lines)
 
 
@@ -121,7 +121,7 @@ _NO_NUMBERS: FloatArray = np.zeros(0)
 def require_on_surface(topology: Topology, points: SurfacePoints, name: str) -> None:
     """Raise InvalidInput if points are none, or name faces that the mesh does not have."""
     if not isinstance(points, SurfacePoints):
-        raise InvalidInput(f"{name} must be SurfacePoints(faces, barycentric), but {type(points).__name__} came.")
+        raise InvalidInput(f"{name} must be SurfacePoints(faces, barycentric), but got {type(points).__name__}.")
     m = len(topology.tail) // 3
     if len(points.faces) and (points.faces.min() < 0 or points.faces.max() >= m):
         bad = int(np.argmax((points.faces < 0) | (points.faces >= m)))

@@ -49,7 +49,7 @@ MOST_CROSSINGS = constant(5_000_000)
 MEETING = 4.0 * SNAP  # the wider sense in which a walk meets vertices that it is to stop at
 GRAZE = 1e-10  # radians by which a direction may point out of a boundary and still run along it
 # Legs of a chain join at vertices. A leg that ends this near to one, as a part of an edge, ends there: vertices on
-# its way that are not quite flat (EXCESS) may have turned it a little.
+# its path that are not quite flat (EXCESS) may have turned it a little.
 JOINT = 1e-9
 
 
@@ -190,7 +190,7 @@ def walk(
                 max(((ox - x) * dy + y * dx) * inverse, 0.0), size
             )  # from the mesh.tail or head to the apex
         at_vertex, arrival = along <= near or size - along <= near, near
-        if at_vertex:  # the way to the vertex, not to where the ray leaves beside it
+        if at_vertex:  # the step to the vertex, not to where the ray leaves beside it
             along = 0.0 if along <= near else size
             vx, vy = ox + along * ux - x, along * uy - y
             step, miss = max(vx * dx + vy * dy, 0.0), vy * dx - vx * dy

@@ -1,4 +1,4 @@
-"""Polygons to triangles by ear clipping, with the way back to the polygon that each triangle came from.
+"""Polygons to triangles by ear clipping, with the index of the polygon that each triangle came from.
 
 A fan is wrong on concave polygons (it covered 14.0 of a pentagon of area 10.0), so every reader and every
 adapter triangulates here. Quads take a vectorised path; larger polygons are clipped one by one, best ear
@@ -60,7 +60,7 @@ def triangulate(face_sizes: Any, face_indices: Any, points: Any) -> tuple[IntArr
 
 
 def _only_triangles(triangles: IntArray) -> tuple[IntArray, IntArray, tuple[str, ...]]:
-    """The short way for what is a triangle mesh already: (m, 3) triangles with three corners are kept."""
+    """The shortcut for what is a triangle mesh already: (m, 3) triangles with three corners are kept."""
     real = _all_different(triangles)
     if real.all():
         return triangles.copy(), np.arange(len(triangles)), ()
@@ -174,7 +174,7 @@ def check_polygons(sizes: IntArray, corners: IntArray, count: int) -> None:
     if len(sizes) and sizes.min() < 0:
         raise InvalidInput(f"face sizes must not be negative, but face {int(sizes.argmin())} has {sizes.min()}.")
     if int(sizes.sum()) != len(corners):
-        raise InvalidInput(f"face sizes add up to {int(sizes.sum())} corners, but {len(corners)} indices came.")
+        raise InvalidInput(f"face sizes add up to {int(sizes.sum())} corners, but got {len(corners)} indices.")
     if len(corners) and not (corners.min() >= 0 and corners.max() < count):
         bad = int(np.argmax((corners < 0) | (corners >= count)))
         raise InvalidInput(f"face indices must be in 0..{count - 1}, but corner {bad} is {int(corners[bad])}.")

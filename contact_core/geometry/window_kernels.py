@@ -1,16 +1,18 @@
 """Kernels of the exact log map: continuous Dijkstra with windows (Mitchell, Mount and Papadimitriou 1987).
 
-A window is light that enters a face through an interval [b0, b1] of halfedge h, straight from a root: a source, or
-a saddle or boundary vertex that a path bends round. It keeps the root's position S in the frame of h (S below the
-edge) and a rotation from that frame to the root's, so that length and initial direction of the way to any point p
-of the face are |p - S| and (p - S) * rotation. Windows leave a heap in order of distance (Chen and Han 1990,
-improved by Xin and Wang 2009): a window whose cone holds the apex splits in two, but of all windows that enter
-through h only the one that is nearest to the apex keeps both children (`claim`); and a window that the vertices
-round it outdo is dropped. Light that comes twice with one image (mirror ways round a fold) goes on once: without
-that, windows double at every fold.
+A window is a bundle of straight paths from one root that enter a face through an interval [b0, b1] of halfedge h.
+The root is a source, or a pseudo-source: a saddle or boundary vertex that paths bend round. The window keeps the
+root's position S in the frame of h (S below the edge) and a rotation from that frame to the root's, so that the
+straight path to any point p of the face has length |p - S| and leaves the root along (p - S) * rotation.
+
+Windows leave a queue in order of distance (Chen and Han 1990, improved by Xin and Wang 2009). A window whose cone
+holds the apex of the face splits in two, but of all windows that enter through h only the one with the shortest
+path to the apex, which occupies it, keeps both children (`Windows.occupied`). A window is dropped where a path
+through a vertex beside it is shorter. Two windows with the same image (along mirrored paths round a fold) go on as
+one: else windows would double at every fold.
 
 Work arrays belong to a mesh and are never cleared: what carries an older epoch counts as empty, so a query touches
-no more memory than its region has. Indices: see `workspace.Workspace`.
+no more memory than its region has.
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ ONLY_CHILD, LEFT_CHILD, RIGHT_CHILD = constant(0), constant(1), constant(2)
 GRAZING = 1e-11
 BLUR = 4e-15
 MOST_SLACK = 1e-6
-# A way so near to the rim of its window (in slacks) may meet a vertex when it is walked, for a walk meets what it
+# A path so near to the rim of its window (in slacks) may meet a vertex when it is walked, for a walk meets what it
 # misses by SNAP, a thousand times more than the blur of a face. `path_kernels.bend_met` looks whether it does.
 TOUCHING = 1e3
 INSIDE = constant(0)  # of a path that does not touch the rim of its window
@@ -258,7 +260,8 @@ def is_displaced(w: int, mesh: Halfedges, labels: Labels, windows: Windows) -> b
 def windows_of_pseudo_source(
     v: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue
 ) -> None:
-    """Cast windows from v, reached from angle leg[v, 2], into its shadow: half a turn or more off, both ways."""
+    """Queue the windows of pseudo-source v: all directions at half a turn or more, on both sides, from direction
+    leg[v, 2] back along its path; and label its neighbours."""
     labels.origin[v, 2] = 1
     sigma, back, total = labels.reach[v, 1], labels.leg[v, 2], mesh.angle_sum[v]
     rim = mesh.kind[v] == BOUNDARY_VERTEX
@@ -339,7 +342,7 @@ def windows_of_source(
     windows: Windows,
     queue: Queue,
 ) -> None:
-    """Light a face from the source at (x, y) in the frame of halfedge `base`: its corners, and windows out of it.
+    """Start windows from the source at (x, y) in the frame of halfedge `base` out of its face; label its corners.
 
     on: what the source lies on; the face, `base`, or the tail of `base`. No window leaves through its own edges.
     """

@@ -128,7 +128,7 @@ def bones_through(bones: FloatArray, mesh: TriangleMesh) -> BoolArray:
     crossed = np.zeros(len(bones), bool)
     real = along.any(axis=1)
     if real.any():
-        crossed[real] = Locator.of(mesh).cast(bones[real, 0], along[real], max_distance=1.0).hit
+        crossed[real] = Locator.of(mesh).cast(bones[real, 0], along[real], max_distance=1.0).found
     return crossed
 
 

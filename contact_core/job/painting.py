@@ -116,7 +116,7 @@ def _outside_of_joint(rig: Rig, mesh: TriangleMesh, name: str, spec: PointSpec) 
     else:
         toward = np.asarray(spec.toward, float)
     hit = Locator.of(mesh).cast(origin[None], toward[None])
-    return hit.points() if hit.hit[0] else Locator.of(mesh).closest(origin[None]).points
+    return hit.points if hit.found[0] else Locator.of(mesh).closest(origin[None]).points
 
 
 def _mesh_vertices(asset: Asset, vertices: IntArray) -> IntArray:

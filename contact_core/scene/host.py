@@ -72,7 +72,7 @@ class HostAdapter(Protocol):
 
 @runtime_checkable
 class SceneReading(HostAdapter, Protocol):
-    """Meshes. A surface has the object's scale and shear applied (`geometry.placement`), nothing else."""
+    """Meshes. A surface has the object's scale and shear applied (`geometry.polar`), nothing else."""
 
     @abstractmethod
     def objects(self) -> tuple[SceneObject, ...]: ...

@@ -18,7 +18,7 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, FileRefused, InvalidInput
-from contact_core.geometry.placement import Placement, split_world_from_local
+from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.scene.camera import camera_of
@@ -297,5 +297,5 @@ class MemoryHost(
         return True
 
 
-def _placement(item: MemoryObject) -> Placement:
+def _placement(item: MemoryObject) -> PolarDecomposition:
     return split_world_from_local(item.world)

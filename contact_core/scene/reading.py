@@ -1,6 +1,6 @@
 """From a host's polygons and rigs to surface space: one code for every host, so that all give the same numbers.
 
-Surface space is the object's own space with the stretch of its world matrix applied (`geometry.placement`).
+Surface space is the object's own space with the stretch of its world matrix applied (`geometry.polar`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from contact_core.arrays import FloatArray, frozen
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.placement import Placement
+from contact_core.geometry.polar import PolarDecomposition
 from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.triangulate import triangulate
 from contact_core.rig.rig import JointFreedom, Pose, Rig
@@ -26,7 +26,7 @@ def surface_of_polygons(
     points: Any,
     face_sizes: Any,
     face_indices: Any,
-    placement: Placement,
+    placement: PolarDecomposition,
     space: SceneSpace,
     *,
     clockwise: bool = False,
@@ -82,7 +82,7 @@ def turn_up(source: Literal["X", "Y", "Z"], target: Literal["X", "Y", "Z"]) -> F
     return matrix
 
 
-def stretch_rig(rig: Rig, placement: Placement, space: SceneSpace) -> Rig:
+def stretch_rig(rig: Rig, placement: PolarDecomposition, space: SceneSpace) -> Rig:
     """A rig in surface space. Raises InvalidInput where its scale is not uniform: joints could not turn rigidly."""
     if placement.uniform_scale == 1.0 and (rig.meters_per_unit, rig.up_axis) == (
         space.meters_per_unit,

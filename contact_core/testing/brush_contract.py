@@ -43,7 +43,8 @@ def drawn(mesh: TriangleMesh, middle: FloatArray, *, seed: int = 0) -> BrushGest
         origins = np.concatenate([positions, np.full((len(positions), 1), top)], axis=1)
         return origins, np.tile([0.0, 0.0, -1.0], (len(positions), 1))
 
-    path = Locator.of(mesh).cast(*rays(screen)).points()
+    hits = Locator.of(mesh).cast(*rays(screen))
+    path = hits.points[hits.found]
     return BrushGesture(mesh, path, radius=0.15, spacing=0.04, screen=screen, rays=rays, seed=seed)
 
 

@@ -21,7 +21,7 @@ import pytest
 from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, FileRefused
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.placement import split_world_from_local
+from contact_core.geometry.polar import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
 from contact_core.scene.host import SceneObject, SceneSpace, StoredDocument

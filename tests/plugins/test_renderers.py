@@ -66,7 +66,7 @@ def test_a_pixel_is_covered_where_its_ray_hits(
         [(x - SIZE[0] / 2) / focal, -(y - SIZE[1] / 2 * (1 + camera.drop)) / focal, -np.ones_like(x)], -1
     )
     rays = seen.reshape(-1, 3) @ camera.camera_from_world
-    hit = Locator.of(mesh).cast(np.tile(camera.eye, (len(rays), 1)), rays).hit.reshape(SIZE[::-1])
+    hit = Locator.of(mesh).cast(np.tile(camera.eye, (len(rays), 1)), rays).found.reshape(SIZE[::-1])
     rows = slice(24, SIZE[1])  # below the table
     assert (covered(image)[rows] != hit[rows]).mean() < 0.04
     assert hit.mean() > 0.1

@@ -19,7 +19,7 @@ from contact_blender.undo import UndoBridge
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, FileRefused, InvalidInput
-from contact_core.geometry.placement import Placement, split_world_from_local
+from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
 from contact_core.scene.host import (
@@ -280,7 +280,7 @@ class BlenderHost(
             )
         return scene_object
 
-    def _rigged(self, object_id: str) -> tuple[Any, Any, Placement]:
+    def _rigged(self, object_id: str) -> tuple[Any, Any, PolarDecomposition]:
         """Mesh object, armature object, placement of the armature."""
         scene_object = self._mesh_object(object_id)
         armature = rigs.armature_of(scene_object)
@@ -295,7 +295,7 @@ class BlenderHost(
             self.read_rig(object_id)
         return self._known[object_id]
 
-    def _placement(self, scene_object: Any, frame: float | None = None) -> Placement:
+    def _placement(self, scene_object: Any, frame: float | None = None) -> PolarDecomposition:
         with evaluation.graph_at(frame, scene_object) as depsgraph:
             return split_world_from_local(np.array(scene_object.evaluated_get(depsgraph).matrix_world, float))
 

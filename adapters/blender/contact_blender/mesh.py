@@ -1,7 +1,7 @@
 """Meshes out of Blender: by whole attributes, in single precision as Blender stores them, in any mode.
 
 Functions here take Blender objects for immediate use and return plain arrays. Coordinates are object-local;
-`contact_core.geometry.placement` makes the surface of them.
+`contact_core.geometry.polar` makes the surface of them.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from pxr import Gf, Tf, Usd, UsdGeom
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
-from contact_core.geometry.placement import Placement, split_world_from_local
+from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
 from contact_core.scene.host import SceneSpace
 from contact_core.scene.reading import surface_of_polygons
 from contact_usd.stage_io import reason
@@ -54,7 +54,7 @@ def world_of(prim: Usd.Prim, frame: float | None = None) -> FloatArray:
     return matrix_of(UsdGeom.XformCache(time_code(frame)).GetLocalToWorldTransform(prim))
 
 
-def placement_of(prim: Usd.Prim, frame: float | None = None) -> Placement:
+def placement_of(prim: Usd.Prim, frame: float | None = None) -> PolarDecomposition:
     """Where a prim stands: the stretch as it stands, the motion at the frame. Raises InvalidInput with its path."""
     try:
         still = split_world_from_local(world_of(prim))

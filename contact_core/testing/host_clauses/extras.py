@@ -57,7 +57,7 @@ class ExtraClauses(HostGround):
         hits = Locator(host.read_surface(object_id(host, "plain")).mesh).cast(
             transform_points(local, origins), directions @ local[:3, :3].T
         )
-        assert (hits.faces >= 0).tolist() == [True, False, False]
+        assert hits.found.tolist() == [True, False, False]
         _, (above, below) = host.rays([[width / 2, 0.0], [width / 2, float(height)]])
         assert above @ picture.up > below @ picture.up
 

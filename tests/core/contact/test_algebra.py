@@ -277,7 +277,7 @@ def sphere_error(subdivisions: int, edit: str) -> float:
 
     def at(*direction: float) -> SurfacePoints:
         d = np.array(direction) / np.linalg.norm(direction)
-        return Locator(mesh).cast(np.zeros((1, 3)), d[None]).points()
+        return Locator(mesh).cast(np.zeros((1, 3)), d[None]).points
 
     start, north = np.array([1.0, 0.2, 0.1]), np.array([0.3, -0.1, 1.0])
     start, north = start / np.linalg.norm(start), north / np.linalg.norm(north)

@@ -15,7 +15,7 @@ from contact_core.document.asset import Asset
 from contact_core.document.schema import parse_document, same_documents
 from contact_core.edit.commands.organising import Recolor
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.geometry.placement import split_world_from_local
+from contact_core.geometry.polar import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import JointFreedom, Pose, Rig, forward_kinematics, skin
 from contact_core.scene.host import CAPABILITIES, SceneSpace, capabilities

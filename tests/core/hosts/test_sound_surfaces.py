@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contact_core.geometry.placement import split_world_from_local
+from contact_core.geometry.polar import split_world_from_local
 from contact_core.geometry.report import report
 from contact_core.scene.host import SceneSpace
 from contact_core.scene.reading import surface_of_polygons

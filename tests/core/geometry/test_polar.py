@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from contact_core.errors import InvalidInput
-from contact_core.geometry.placement import split_world_from_local
+from contact_core.geometry.polar import split_world_from_local
 from contact_core.testing import meshes
 
 turns = st.tuples(*4 * [st.floats(-1, 1)]).filter(lambda q: np.linalg.norm(q) > 0.1)

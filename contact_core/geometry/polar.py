@@ -1,6 +1,6 @@
-"""Where an object stands: its matrix split into a rigid placement and the stretch that shapes its surface.
+"""The polar decomposition of an object's world matrix: a rigid motion, and the stretch that shapes its surface.
 
-Every host splits with this function, so that one scene gives one surface, and one digest, in all of them.
+Every host decomposes with this function, so that one scene gives one surface, and one digest, in all of them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _ROUNDING = 2e-6  # of the largest scale: turning an object in float32 (noise 2e
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class PolarDecomposition:
     """world_from_local = world_from_surface @ surface_from_local.
 
     world_from_surface: (4, 4) rigid and proper. surface_from_local: (3, 3) scale, shear and mirror.
@@ -46,7 +46,7 @@ class Placement:
         return local @ self.surface_from_local.T
 
 
-def split_world_from_local(world_from_local: Any) -> Placement:
+def split_world_from_local(world_from_local: Any) -> PolarDecomposition:
     """Split an affine matrix (4, 4) by polar decomposition (Higham 1986): turn and shift, stretch and mirror.
 
     The stretch is symmetric; of a mirrored object it is a mirror along the object's x after a symmetric stretch.
@@ -55,7 +55,7 @@ def split_world_from_local(world_from_local: Any) -> Placement:
     """
     matrix = frozen(world_from_local, np.float64, (4, 4), "world_from_local")
     if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0], atol=1e-9):
-        raise InvalidInput(f"a world matrix has the last row 0 0 0 1, but {matrix[3].tolist()} came.")
+        raise InvalidInput(f"a world matrix has the last row 0 0 0 1, but got {matrix[3].tolist()}.")
     left, scales, right = np.linalg.svd(matrix[:3, :3])
     if not scales[-1] > 1e-9 * scales[0]:
         raise InvalidInput(f"the object is scaled flat, by {scales.tolist()}: there is no surface to paint on.")
@@ -64,7 +64,7 @@ def split_world_from_local(world_from_local: Any) -> Placement:
         turn, stretch = turn @ _MIRROR, _MIRROR @ stretch
     rigid = np.eye(4)
     rigid[:3, :3], rigid[:3, 3] = turn, matrix[:3, 3]
-    return Placement(
+    return PolarDecomposition(
         frozen(rigid, np.float64, (4, 4), "world_from_surface"),
         frozen(_rounded(stretch, float(scales[0])), np.float64, (3, 3), "surface_from_local"),
     )
