@@ -66,7 +66,8 @@ def passed(gesture: BrushGesture, samples: int = 200_000) -> SurfacePoints:
     at = np.linspace(0.0, len(gesture.screen) - 1.0, samples)
     number = np.arange(len(gesture.screen))
     places = np.stack([np.interp(at, number, gesture.screen[:, axis]) for axis in (0, 1)], -1)
-    points = Locator.of(gesture.seen or gesture.mesh).cast(*gesture.rays(places)).points
+    hits = Locator.of(gesture.seen or gesture.mesh).cast(*gesture.rays(places))
+    points = hits.points[hits.found]
     return points[first_of_each(points.positions(gesture.mesh), 0.02 * gesture.radius)]
 
 
@@ -94,7 +95,8 @@ def test_a_stroke_through_space_goes_where_the_pointer_never_was() -> None:
     """The law above can fail: the reported points alone, joined through space, mark what nobody saw."""
     mesh = rigs.hand_like().surface
     gesture = across(mesh, 1, 0.05 * mesh.bounding_box_diagonal)
-    corners = Locator.of(mesh).cast(*gesture.rays(gesture.screen)).points
+    hits = Locator.of(mesh).cast(*gesture.rays(gesture.screen))
+    corners = hits.points[hits.found]
     joined = replace(gesture, path=corners)
     assert share_beyond(gesture, DiskBrush().mark(joined).points, ABOUT * gesture.radius) > 0.05
 
@@ -120,7 +122,8 @@ def test_cut_gestures_do_for_any_brush_what_the_brushes_do_alone(name: str) -> N
         assert (np.linalg.norm(np.diff(at, axis=0), axis=1) <= 0.25 * gesture.radius).all()
         marked = DiskBrush().mark(replace(part, screen=None, rays=None)).points
         assert share_beyond(gesture, marked, ABOUT * gesture.radius) == 0.0
-        ends = Locator.of(mesh).cast(*part.rays(part.screen[[0, -1]])).points.positions(mesh)
+        hits = Locator.of(mesh).cast(*part.rays(part.screen[[0, -1]]))
+        ends = hits.points[hits.found].positions(mesh)
         np.testing.assert_allclose(ends, at[[0, -1]], atol=1e-6 * mesh.bounding_box_diagonal)
 
 
