@@ -52,9 +52,9 @@ def _pad(
     mesh = rig.surface
     locator = Locator.of(mesh)
     hit = locator.cast(origin[None], out[None])
-    if not hit.hit[0]:
+    if not hit.found[0]:
         return None
-    centre = hit.points()
+    centre = hit.points
     normal = centre.normals(mesh)[0]
     size = OF_DEPTH * float(hit.distance[0]) if radius is None else radius
     heading = unit(across(along, normal))
@@ -69,4 +69,4 @@ def _pad(
 def palm_point(anatomy: Anatomy, inside: FloatArray, normal: FloatArray) -> FloatArray:
     """(3,) the skin above a point within the palm; the point itself where no skin lies that way."""
     hit = Locator.of(anatomy.rig.surface).cast(inside[None], normal[None])
-    return np.asarray(inside + float(hit.distance[0]) * normal if hit.hit[0] else inside)
+    return np.asarray(inside + float(hit.distance[0]) * normal if hit.found[0] else inside)
