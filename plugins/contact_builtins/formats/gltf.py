@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from contact_builtins.formats.gltf_container import open_gltf
+from contact_builtins.formats.gltf_nodes import read_nodes
 from contact_builtins.formats.gltf_rig import rig_asset
-from contact_builtins.formats.gltf_scene import Part, read_nodes, read_parts
+from contact_builtins.formats.gltf_scene import Part, read_parts
 from contact_builtins.formats.polygons import Polygons, surface_of
 from contact_builtins.formats.refusal import refusing
 from contact_builtins.formats.sidecar import read_sidecar, sidecar_beside
@@ -31,8 +32,8 @@ class GltfFiles:
     def read(self, path: Path, *, sidecar: Path | None = None) -> Asset:
         """The scene in a file: one rig when any mesh is skinned, else one mesh. Raises FileRefused."""
         path = Path(path)
-        told = sidecar or sidecar_beside(path)
         with refusing(path, "a glTF 2.0 file"):
+            told = sidecar or sidecar_beside(path)
             gltf = open_gltf(path)
             nodes = read_nodes(gltf)
             parts, notes = read_parts(gltf, nodes)

@@ -28,9 +28,21 @@ COMPRESSED = {
     "EXT_meshopt_compression": "meshopt",
     "KHR_meshopt_compression": "meshopt",
 }
-# Required extensions that change looks, not shapes.
-HARMLESS = ("KHR_materials_", "EXT_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "MSFT_texture_")
-UNDERSTOOD = ("KHR_mesh_quantization",)
+# Required extensions that change looks, behaviour or meaning, but not shapes.
+HARMLESS = (
+    "KHR_materials_", "EXT_materials_", "ADOBE_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
+    "KHR_lights_", "EXT_lights_", "KHR_animation_", "KHR_node_", "KHR_xmp", "KHR_audio", "KHR_interactivity",
+    "KHR_physics_", "KHR_environment", "KHR_techniques_", "KHR_blend", "KHR_character", "KHR_mesh_variants",
+    "EXT_structural_metadata", "EXT_mesh_features", "EXT_instance_features", "EXT_feature_", "EXT_mesh_manifold",
+    "EXT_property_", "EXT_bmesh_encoding", "MSFT_physics", "MSFT_audio", "MSFT_lod", "MSFT_packing_",
+    "CESIUM_primitive_outline", "AGI_", "ASOBO_", "BLENDER_", "FB_ngon_encoding", "GODOT_", "MOZ_", "NEEDLE_",
+    "MX_", "OMI_", "VRM",
+)  # fmt: skip
+UNDERSTOOD = ("KHR_mesh_quantization", "KHR_draco_mesh_compression")
+_OLD = (
+    "{path} is glTF version {version}, an old format that is laid out otherwise; version 2 is read. Convert it"
+    " (gltf-pipeline does) or export it anew as glTF 2.0."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +55,12 @@ class Gltf:
 
     def entries(self, kind: str) -> list[dict[str, Any]]:
         """A top-level list of the document ("nodes", "meshes"), empty where absent."""
-        found = self.document.get(kind, [])
-        if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
-            raise InvalidInput(f"{kind} is not a list of objects")
-        return found
+        if kind not in self._checked:  # once: a look at every entry for each entry is a square
+            found = self.document.get(kind, [])
+            if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
+                raise InvalidInput(f"{kind} is not a list of objects")
+            self._checked[kind] = found
+        return self._checked[kind]
 
     def entry(self, kind: str, index: Any) -> dict[str, Any]:
         """One entry of a top-level list. Raises InvalidInput when there is none."""
@@ -56,18 +70,30 @@ class Gltf:
         return entries[index]
 
     @cached_property
+    def _checked(self) -> dict[str, list[dict[str, Any]]]:
+        return {}
+
+    @cached_property
     def _buffers(self) -> list[bytes]:
         return [self._buffer(index, entry) for index, entry in enumerate(self.entries("buffers"))]
 
+    def view_bytes(self, index: Any) -> bytes:
+        """The bytes of a buffer view."""
+        data, start, end, _ = self.view(index)
+        return data[start:end]
+
     def _buffer(self, index: int, entry: dict[str, Any]) -> bytes:
         uri = entry.get("uri")
+        if uri is None and any(name in COMPRESSED for name in entry.get("extensions", {})):
+            return b""  # stands for what its views hold compressed
         if uri is None:
             if index:
                 raise InvalidInput(f"buffer {index} has no bytes")
             data = self.binary
-        elif uri.startswith("data:"):
+        elif uri[:5].lower() == "data:":  # schemes and media types are written in either case
             head, _, text = uri.partition(",")
-            data = _decode_base64(text) if head.endswith(";base64") else unquote(text).encode("latin-1")
+            encoded = head.lower().endswith(";base64")
+            data = _decode_base64(unquote(text)) if encoded else unquote(text, "latin-1").encode("latin-1")
         else:
             data = file_bytes(_beside(self.path, uri))
         if len(data) < entry["byteLength"]:
@@ -77,9 +103,12 @@ class Gltf:
     def view(self, index: Any) -> tuple[bytes, int, int, int]:
         """A buffer view: the buffer's bytes, where the view starts and ends in them, and its stride (0: packed)."""
         entry = self.entry("bufferViews", index)
-        if any(name in COMPRESSED for name in entry.get("extensions", {})):
+        buffer = self.entry("buffers", entry["buffer"])
+        # a compressed view may come with its uncompressed twin; where it does not, its buffer has no bytes
+        squeezed = any(name in COMPRESSED for name in entry.get("extensions", {}))
+        empty = any(name in COMPRESSED for name in buffer.get("extensions", {})) or not self.binary
+        if squeezed and empty and "uri" not in buffer:
             raise FileRefused(_compressed(self.path, entry["extensions"]))
-        self.entry("buffers", entry["buffer"])
         data = self._buffers[entry["buffer"]]
         start = bounded_offset(entry.get("byteOffset", 0))
         end = start + bounded_offset(entry["byteLength"])
@@ -130,20 +159,24 @@ def open_gltf(path: Path) -> Gltf:
     """Parse a .glb or .gltf file. Raises FileRefused, InvalidInput, or what a damaged file makes Python raise."""
     data = file_bytes(path)
     if data[:4] == b"glTF":
-        text, binary = _chunks(data)
+        text, binary = _chunks(path, data)
     else:
         text, binary = data, b""
     try:
         document = json.loads(text.decode("utf-8-sig"))
     except ValueError as error:
         raise InvalidInput("it is neither a GLB container nor JSON text") from error
-    if not isinstance(document, dict) or "asset" not in document:
+    if isinstance(document, dict) and any(isinstance(document.get(key), dict) for key in ("meshes", "nodes")):
+        raise FileRefused(_OLD.format(path=path, version="1.0"))  # 1.0 has tables where 2.0 has lists
+    if not isinstance(document, dict) or not isinstance(document.get("asset"), dict):
         raise InvalidInput('it has no "asset" entry, which every glTF file has')
     version = str(document["asset"].get("version", ""))
     if not version.startswith("2."):
+        if version.startswith(("0.", "1")):
+            raise FileRefused(_OLD.format(path=path, version=version))
         raise FileRefused(f"{path} is glTF version {version or 'unknown'}; version 2 is read. Export it anew.")
     required = document.get("extensionsRequired", [])
-    if any(name in COMPRESSED for name in required):
+    if any(COMPRESSED.get(name) == "meshopt" for name in required):
         raise FileRefused(_compressed(path, required))
     for name in required:
         if name not in UNDERSTOOD and not str(name).startswith(HARMLESS):
@@ -160,9 +193,11 @@ def bounded_offset(value: Any) -> int:
     return value
 
 
-def _chunks(data: bytes) -> tuple[bytes, bytes]:
+def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes]:
     """The JSON and the binary chunk of a GLB."""
     _, version, length = np.frombuffer(data, "<u4", 3)
+    if version == 1:
+        raise FileRefused(_OLD.format(path=path, version="1.0"))
     if version != 2:
         raise InvalidInput(f"its container has version {version}; version 2 is read")
     if length > len(data):
@@ -186,16 +221,17 @@ def _beside(path: Path, uri: str) -> Path:
     wanted = (folder / unquote(uri)).resolve()
     if "://" in uri or not wanted.is_relative_to(folder):
         raise FileRefused(
-            f"{path} wants its buffer from {uri!r}, outside its folder; only files below it are read."
+            f"{path} wants its buffer from {uri[:200]!r}, outside its folder; only files below it are read."
         )
     if not wanted.is_file():
-        raise FileRefused(f"{path} needs its buffer {uri!r} beside it, but there is no such file. Copy it there.")
+        raise FileRefused(f"{path} needs its buffer {uri[:200]!r}, but there is no such file. Copy it there.")
     return wanted
 
 
 def _decode_base64(text: str) -> bytes:
+    text = "".join(text.split()).replace("-", "+").replace("_", "/").rstrip("=")
     try:
-        return base64.b64decode(text, validate=True)
+        return base64.b64decode(text + "=" * (-len(text) % 4), validate=True)
     except binascii.Error as error:
         raise InvalidInput(f"a data URI is not base64: {error}") from error
 
@@ -208,4 +244,7 @@ def _denormalised(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def _compressed(path: Path, names: Any) -> str:
     kind = next(COMPRESSED[name] for name in names if name in COMPRESSED)
-    return f"{path} is compressed with {kind}, which is not read here. Export it without mesh compression."
+    return (
+        f"{path} is compressed with {kind}, which is not read here. Export it without mesh compression, or take it"
+        " out (gltf-transform copy does)."
+    )

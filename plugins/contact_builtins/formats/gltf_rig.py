@@ -1,58 +1,37 @@
-"""Skins of a glTF file as one rig: joints, hierarchy, rest and bind, welded skin, influences."""
+"""Skins of a glTF file as one rig: welded skin, influences, freedoms."""
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from contact_builtins.formats.gltf_container import Gltf
-from contact_builtins.formats.gltf_scene import Nodes, Part
+from contact_builtins.formats.gltf_nodes import Nodes
+from contact_builtins.formats.gltf_scene import Part
+from contact_builtins.formats.gltf_skeleton import Skeleton, read_skeleton
 from contact_builtins.formats.polygons import Polygons, surface_of
-from contact_builtins.formats.refusal import bounded
+from contact_builtins.formats.refusal import bounded, named
 from contact_builtins.formats.sidecar import Sidecar
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused, InvalidInput
+from contact_core.errors import InvalidInput
 from contact_core.geometry.transform import transform_points
 from contact_core.hands.freedoms import guess_freedoms
-from contact_core.hands.names import mirrored_pairs, tree_from_names
+from contact_core.hands.names import mirrored_pairs
 from contact_core.rig.rig import JointFreedom, Rig
 
-MAX_JOINTS = 4096
-SAME = 1e-4  # relative difference up to which two transforms count as one
-
-
-@dataclass(frozen=True, eq=False)
-class Skeleton:
-    """Joints of all skins, parents first. nodes: (j,) glTF node of each.
-
-    rest, bind: (j, 4, 4) world_from_joint of the nodes, and as the skin was bound.
-    corrections: per skin, the (4, 4) that takes its bind space to the common one.
-    """
-
-    nodes: tuple[int, ...]
-    names: tuple[str, ...]
-    parents: IntArray
-    rest: FloatArray
-    bind: FloatArray
-    corrections: dict[int, FloatArray]
-    notes: tuple[str, ...]
+LEAST = 1e-6  # weight below which a joint counts for nothing
 
 
 def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | None, notes: list[str]) -> Asset:
     """The asset of a file with skins. Raises FileRefused, InvalidInput."""
-    skeleton = _skeleton(gltf, nodes, sorted({p.skin for p in parts if p.skin is not None}), sidecar)
+    skeleton = read_skeleton(gltf, nodes, sorted({p.skin for p in parts if p.skin is not None}), sidecar)
     bounded(
         sum(len(part.points) for part in parts) * len(skeleton.names) // 16, "weights"
     )  # (n, j) is held at once
     points, faces, weights, left_out = _joined(gltf, nodes, parts, skeleton)
     sums = weights.sum(axis=1)
-    if (sums <= 0).any():
-        raise InvalidInput(f"skin vertex {int(np.argmax(sums <= 0))} has no weight")
     kept, influences = _strongest(weights / sums[:, None])
     # vertices whose weights differ stay apart, else welding would tear one of them
     _, groups = np.unique(np.round(weights / sums[:, None], 3), axis=0, return_inverse=True)
@@ -76,7 +55,7 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
         meters_per_unit=(sidecar and sidecar.meters_per_unit) or 1.0,
         up_axis=(sidecar and sidecar.up_axis) or "Y",
     )
-    freedoms, guessed = _freedoms(rig, sidecar)
+    freedoms, guessed = _freedoms(rig, skeleton.own, sidecar)
     rig = replace(rig, freedoms=freedoms)
     off = float(np.abs(sums - 1.0).max())
     if off > 1e-3:
@@ -101,195 +80,71 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
     )
 
 
-def _skeleton(gltf: Gltf, nodes: Nodes, skins: list[int], sidecar: Sidecar | None) -> Skeleton:
-    bind: dict[int, FloatArray] = {}
-    corrections: dict[int, FloatArray] = {}
-    for skin in skins:
-        entry = gltf.entry("skins", skin)
-        joints = [int(joint) for joint in entry["joints"]]
-        for joint in joints:
-            gltf.entry("nodes", joint)
-        own = _bind_matrices(gltf, entry, joints)
-        # skins of one skeleton may be bound in spaces of their own: take the common joints as the bridge
-        bridges = [bind[j] @ np.linalg.inv(own[k]) for k, j in enumerate(joints) if j in bind]
-        bridge = bridges[0] if bridges else np.eye(4)
-        if any(not _same(other, bridge) for other in bridges):
-            raise FileRefused(
-                f"{gltf.path} binds the joints of skin {skin} otherwise than those of skin {skins[0]};"
-                " one bind pose per joint is read. Join the meshes in your DCC and export again."
-            )
-        corrections[skin] = bridge
-        bind |= {j: bridge @ own[k] for k, j in enumerate(joints) if j not in bind}
-    order = [index for index in nodes.order if index in bind]
-    if len(order) > MAX_JOINTS:
-        raise InvalidInput(f"it has {len(order)} joints; up to {MAX_JOINTS} are read")
-    names = _unique_names(nodes, order)
-    parents, notes = _parents(gltf.path, nodes, order, names, sidecar)
-    sequence = _sorted_parents_first(parents)
-    order = [order[k] for k in sequence]
-    rank = {old: new for new, old in enumerate(sequence)}
-    parents = np.array([rank[int(parents[k])] if parents[k] >= 0 else -1 for k in sequence])
-    placed, bound, mirror = _unmirrored(nodes.world[order], np.array([bind[index] for index in order]))
-    if np.linalg.det(mirror) < 0:
-        corrections = {skin: mirror @ bridge for skin, bridge in corrections.items()}
-        notes.append(
-            "The rig stands mirrored in its scene (a negative scale above it); it was read as it stands there."
-        )
-    rest, bound, scaled = _normalised(placed, bound)
-    if scaled:
-        notes.append(f"Uniform joint scales ({scaled}) were taken out of the joint frames; the skin is unchanged.")
-    return Skeleton(
-        tuple(order), tuple(names[k] for k in sequence), parents, rest, bound, corrections, tuple(notes)
-    )
-
-
-def _bind_matrices(gltf: Gltf, entry: dict[str, Any], joints: list[int]) -> FloatArray:
-    """(k, 4, 4) world_from_joint at which a skin was bound."""
-    if "inverseBindMatrices" not in entry:
-        return np.tile(np.eye(4), (len(joints), 1, 1))
-    inverse = gltf.accessor(entry["inverseBindMatrices"]).astype(np.float64)
-    if inverse.shape[1] != 16 or len(inverse) < len(joints):
-        raise InvalidInput(f"a skin has {len(joints)} joints, but {len(inverse)} inverse bind matrices")
-    inverse = inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
-    if not np.isfinite(inverse).all() or (np.abs(np.linalg.det(inverse)) < 1e-30).any():
-        raise InvalidInput("an inverse bind matrix is singular or not finite")
-    return np.asarray(np.linalg.inv(inverse), np.float64)
-
-
-def _unmirrored(rest: FloatArray, bind: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rest and bind (j, 4, 4) with right-handed joint frames, and the (4, 4) from the old bind space to the new.
-
-    Where every joint rests mirrored against its bind, the bind pose is mirrored too; the skin stays as it is.
-    """
-    rest, bind = rest.copy(), bind.copy()
-    flip = np.diag([-1.0, 1.0, 1.0, 1.0])
-    resting, bound = np.linalg.det(rest[:, :3, :3]), np.linalg.det(bind[:, :3, :3])
-    mirrored = bool((resting * bound < 0).all())
-    if mirrored:
-        bind = flip @ bind
-    if mirrored or (resting * bound > 0).all():
-        left = resting < 0
-        rest[left], bind[left] = rest[left] @ flip, bind[left] @ flip
-    return rest, bind, flip if mirrored else np.eye(4)
-
-
-def _normalised(rest: FloatArray, bind: FloatArray) -> tuple[FloatArray, FloatArray, str]:
-    """Rest and bind with each joint's uniform scale divided out of both, so that the skin stays as it is.
-
-    Non-uniform and negative scales are left alone: with them a turn before and after the scale differ.
-    """
-    rest, bind = rest.copy(), bind.copy()
-    scaled = set[str]()
-    for k in range(len(rest)):
-        linear = rest[k, :3, :3]
-        size = float(np.cbrt(np.linalg.det(linear)))
-        if size > 1e-9 and np.abs(linear.T @ linear / size**2 - np.eye(3)).max() < SAME:
-            u, _, v = np.linalg.svd(linear / size)
-            rest[k, :3, :3] = u @ v
-            bind[k, :3, :3] /= size
-            if abs(size - 1.0) > SAME:
-                scaled.add(f"{size:.4g}")
-    return rest, bind, ", ".join(sorted(scaled))
-
-
-def _parents(
-    path: Path, nodes: Nodes, order: list[int], names: list[str], sidecar: Sidecar | None
-) -> tuple[IntArray, list[str]]:
-    """Parent of each joint as an index into `order`: nearest joint above; else by sidecar; else by names."""
-    position = {node: k for k, node in enumerate(order)}
-    parents = np.full(len(order), -1)
-    for k, node in enumerate(order):
-        above = int(nodes.parents[node])
-        while above >= 0 and above not in position:
-            above = int(nodes.parents[above])
-        parents[k] = position.get(above, -1)
-    given = sidecar.parents(names) if sidecar else {}
-    notes = []
-    if len(order) > 1 and (parents == -1).all() and len(given) < len(order) - 1:
-        found = tree_from_names(names)
-        if found is None:
-            raise FileRefused(
-                f"{path} has {len(order)} joints without a hierarchy, and their names do not tell it. Say each"
-                ' parent in a rig.toml beside it: [[joint]] match = "name" parent = "other".'
-            )
-        given = found | given
-        notes.append("The joints come without a hierarchy; their tree was taken from their names.")
-    for k, name in enumerate(names):
-        if name in given:
-            parents[k] = names.index(given[name]) if given[name] else -1
-    return parents, notes
-
-
-def _sorted_parents_first(parents: IntArray) -> list[int]:
-    """Joints ordered so that parents come first; as they were when they do. Raises InvalidInput on a ring."""
-    if (parents < np.arange(len(parents))).all():
-        return list(range(len(parents)))
-    children: dict[int, list[int]] = defaultdict(list)
-    for index, parent in enumerate(parents.tolist()):
-        children[parent].append(index)
-    order = list(children[-1])
-    for index in order:  # grows while it is walked: level after level
-        order += children[index]
-    if len(order) != len(parents):
-        raise InvalidInput("its joints form a ring instead of a tree")
-    return order
-
-
-def _unique_names(nodes: Nodes, order: list[int]) -> list[str]:
-    """Node names, made unique by their parents' names where they repeat, and by a number where that repeats."""
-    uses = Counter(nodes.names[index] for index in order)
-    names, taken = list[str](), Counter[str]()
-    for index in order:
-        name, above = nodes.names[index], int(nodes.parents[index])
-        if uses[name] > 1 and above >= 0:
-            name = f"{nodes.names[above]}/{name}"
-        taken[name] += 1
-        names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
-    if len(set(names)) != len(names):
-        raise InvalidInput(
-            "its joint names repeat even with their parents' names; give each joint a name of its own"
-        )
-    return names
-
-
 def _joined(
     gltf: Gltf, nodes: Nodes, parts: list[Part], skeleton: Skeleton
 ) -> tuple[FloatArray, IntArray, FloatArray, list[str]]:
     """All parts in the common bind space: points (n, 3), faces (m, 3), weights (n, j), and notes."""
-    index_of = {node: k for k, node in enumerate(skeleton.nodes)}
-    points, faces, weights, notes = list[FloatArray](), list[IntArray](), list[FloatArray](), list[str]()
-    offset = 0
+    index_of = {node: k for k, node in reversed(list(enumerate(skeleton.nodes)))}
+    points, faces, weights = list[FloatArray](), list[IntArray](), list[FloatArray]()
+    offset, loose = 0, list[str]()
+    notes: dict[str, None] = {}
     for part in parts:
         if part.skin is not None and part.joints is not None and part.weights is not None:
-            table = np.array([index_of[int(joint)] for joint in gltf.entry("skins", part.skin)["joints"]])
-            if len(part.joints) and part.joints.max() >= len(table):
-                raise InvalidInput(f"a vertex names joint {int(part.joints.max())} of {len(table)}")
-            own = np.zeros((len(part.points), len(table)))
-            rows = np.arange(len(part.points))
-            for k in range(part.joints.shape[1]):
-                np.add.at(own, (rows, part.joints[:, k]), part.weights[:, k])
-            weight = np.zeros((len(part.points), len(index_of)))
-            weight[:, table] = own
+            weight = _weights(part.joints, part.weights, skeleton.tables[part.skin], len(skeleton.nodes), notes)
             bridge = skeleton.corrections[part.skin]
             placed = transform_points(bridge, part.points)
+            turned = np.linalg.det(bridge[:3, :3]) < 0
         else:
             carrier = part.node
             while carrier >= 0 and carrier not in index_of:
                 carrier = int(nodes.parents[carrier])
             if carrier < 0:
-                notes.append(f"The mesh of node {nodes.names[part.node]!r} hangs on no joint and was left out.")
+                loose.append(nodes.names[part.node])
                 continue
             joint = index_of[carrier]  # rides rigidly: back from where it rests to where it was bound
             move = skeleton.bind[joint] @ np.linalg.inv(skeleton.rest[joint])
             placed = transform_points(move, part.points)
-            weight = np.zeros((len(part.points), len(index_of)))
+            turned = False  # its faces are right where it rests
+            weight = np.zeros((len(part.points), len(skeleton.nodes)))
             weight[:, joint] = 1.0
         points.append(placed)
-        turned = part.skin is not None and np.linalg.det(skeleton.corrections[part.skin][:3, :3]) < 0
         faces.append((part.faces[:, ::-1] if turned else part.faces) + offset)
         weights.append(weight)
         offset += len(part.points)
-    return np.concatenate(points), np.concatenate(faces), np.concatenate(weights), notes
+    if loose:
+        notes[f"Meshes below no joint do not move with the rig and were left out: {named(loose)}."] = None
+    return np.concatenate(points), np.concatenate(faces), np.concatenate(weights), list(notes)
+
+
+def _weights(
+    joints: IntArray, weights: FloatArray, table: IntArray, count: int, notes: dict[str, None]
+) -> FloatArray:
+    """(n, count) weights of a part by joint. One odd number does not spoil a rig: what was done is noted.
+
+    Raises InvalidInput where a vertex follows a joint that the skin does not have.
+    """
+    odd = ~np.isfinite(weights) | (weights < 0)
+    if odd.any():
+        notes[f"{int(odd.any(axis=1).sum())} vertices had weights below zero or no numbers, which count as 0."] = (
+            None
+        )
+        weights = np.where(odd, 0.0, weights)
+    none = weights.sum(axis=1) <= 0
+    if none.any():
+        notes[f"{int(none.sum())} vertices had no weight and follow their first joint, as in viewers."] = None
+        weights = np.array(weights)
+        weights[none, 0] = 1.0
+        first = np.where(joints[:, 0] < len(table), joints[:, 0], 0)
+        joints = np.where(none[:, None], first[:, None], joints)
+    stray = (joints < 0) | (joints >= len(table))
+    if (stray & (weights > LEAST)).any():
+        raise InvalidInput(f"a vertex names joint {int(joints[stray & (weights > LEAST)][0])} of {len(table)}")
+    weights = np.where(stray, 0.0, weights)
+    result = np.zeros((len(joints), count))
+    rows = np.arange(len(joints))
+    for k in range(joints.shape[1]):
+        np.add.at(result, (rows, table[np.where(stray[:, k], 0, joints[:, k])]), weights[:, k])
+    return result
 
 
 def _strongest(weights: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -300,8 +155,14 @@ def _strongest(weights: FloatArray) -> tuple[IntArray, FloatArray]:
     return joints.astype(np.int64), kept / kept.sum(axis=1, keepdims=True)
 
 
-def _freedoms(rig: Rig, sidecar: Sidecar | None) -> tuple[tuple[JointFreedom, ...], list[str]]:
-    """Freedoms by the sidecar over guesses, and notes. Raises FileRefused, InvalidInput."""
+def _freedoms(rig: Rig, own: int, sidecar: Sidecar | None) -> tuple[tuple[JointFreedom, ...], list[str]]:
+    """Freedoms by the sidecar over guesses, and notes. own: joints behind the first `own` ride on one of them.
+
+    Raises FileRefused, InvalidInput.
+    """
+    riders = tuple(JointFreedom(kind="fixed") for _ in rig.joints[own:])
+    if riders:
+        rig = _without_riders(rig, own)
     if sidecar is not None and not sidecar.guess:
         freedoms: tuple[JointFreedom, ...] = tuple(JointFreedom(kind="fixed") for _ in rig.joints)
         notes: list[str] = []
@@ -310,8 +171,19 @@ def _freedoms(rig: Rig, sidecar: Sidecar | None) -> tuple[tuple[JointFreedom, ..
     if sidecar is not None:
         freedoms = sidecar.freedoms(rig.joints, freedoms)
         notes = [f"Joint freedoms were set by {sidecar.path.name}."]
-    return freedoms, notes
+    return (*freedoms, *riders), notes
 
 
-def _same(a: FloatArray, b: FloatArray) -> bool:
-    return bool(np.abs(a - b).max() <= SAME * max(1.0, float(np.abs(b).max())))
+def _without_riders(rig: Rig, own: int) -> Rig:
+    """The rig bound as it rests, its skin on the first `own` joints: what the others move, theirs move alike."""
+    carrier = np.concatenate([np.arange(own), rig.parents[own:]])
+    return replace(
+        rig,
+        joints=rig.joints[:own],
+        parents=rig.parents[:own],
+        rest_local=rig.rest_local[:own],
+        bind_world=rig.rest_world[:own],
+        bind_points=rig.surface.points,
+        skin_joints=carrier[rig.skin_joints],
+        freedoms=rig.freedoms[:own],
+    )

@@ -89,7 +89,11 @@ def _add_object(scene: _Scene, holder: int, asset: Asset, pose: Pose | None) -> 
         raise InvalidInput(f"{asset.name!r} has no rig: its pose is one transform, but {len(pose.joints)} came.")
     mesh = _add_mesh(scene, asset.name, asset.mesh.points, asset.mesh.faces, asset.mesh.vertex_normals, {})
     world = np.eye(4) if pose is None else pose.local[0]
-    scene.nodes[holder]["children"].append(scene.node(name=f"{asset.name} mesh", mesh=mesh, **_transform(world)))
+    outer, inner = node_transforms(world)
+    child = scene.node(name=f"{asset.name} mesh", mesh=mesh, **inner)
+    if outer is not None:
+        child = scene.node(name=f"{asset.name} stretch", children=[child], **outer)
+    scene.nodes[holder]["children"].append(child)
 
 
 def _add_rig(scene: _Scene, holder: int, rig: Rig, pose: Pose) -> None:
@@ -97,11 +101,15 @@ def _add_rig(scene: _Scene, holder: int, rig: Rig, pose: Pose) -> None:
     for name, matrix in zip(pose.joints, pose.local, strict=True):
         local[rig.joint_index(name)] = matrix
     first = len(scene.nodes)
-    for name, matrix in zip(rig.joints, local, strict=True):
-        scene.node(name=name, **_transform(matrix))
-    for index, parent in enumerate(rig.parents):
+    split = [node_transforms(matrix) for matrix in local]
+    for name, (_, inner) in zip(rig.joints, split, strict=True):
+        scene.node(name=name, **inner)
+    for index, (parent, (outer, _)) in enumerate(zip(rig.parents, split, strict=True)):
         owner = scene.nodes[first + int(parent)] if parent >= 0 else scene.nodes[holder]
-        owner.setdefault("children", []).append(first + index)
+        child = first + index
+        if outer is not None:
+            child = scene.node(name=f"{rig.joints[index]} stretch", children=[child], **outer)
+        owner.setdefault("children", []).append(child)
     inverse = np.linalg.inv(rig.bind_world).transpose(0, 2, 1).reshape(-1, 16).astype("<f4")
     joints = [first + index for index in range(len(rig.joints))]
     scene.skins.append({"name": rig.name, "joints": joints, "inverseBindMatrices": scene.accessor(inverse)})
@@ -147,16 +155,32 @@ def _to_gltf(asset: Asset) -> FloatArray:
     return matrix
 
 
-def _transform(matrix: FloatArray) -> dict[str, Any]:
-    """A node's TRS where the matrix is one (viewers and DCCs prefer it for joints), else its matrix."""
-    scale = np.linalg.norm(matrix[:3, :3], axis=0)
-    if (scale > 0).all():
-        rotation = matrix[:3, :3] / scale
-        if np.linalg.det(rotation) > 0 and np.abs(rotation.T @ rotation - np.eye(3)).max() < 1e-6:
-            w, x, y, z = quaternion(rotation)
-            trs: dict[str, Any] = {"translation": matrix[:3, 3].tolist(), "rotation": [x, y, z, w]}
-            return trs if np.abs(scale - 1).max() < 1e-7 else {**trs, "scale": scale.tolist()}
-    return {"matrix": _columns(matrix)}
+def node_transforms(matrix: FloatArray) -> tuple[dict[str, Any] | None, dict[str, Any]]:
+    """A (4, 4) as the nodes that viewers multiply to it: (None, node), or (node above, node) where it is sheared.
+
+    A node is a translation, a rotation and a scale, or a matrix that splits into them (glTF 2.0, 3.5.3); a joint of
+    uneven scales that turns is not. Any matrix is U S V^T (singular values): U and S go into the node above.
+    """
+    linear = matrix[:3, :3]
+    scale = np.linalg.norm(linear, axis=0)
+    if np.linalg.det(linear) < 0:
+        scale[0] = -scale[0]
+    if scale.all():
+        rotation = linear / scale
+        if np.abs(rotation.T @ rotation - np.eye(3)).max() < 1e-6:
+            return None, _trs(matrix[:3, 3], rotation, scale)
+    u, size, vt = np.linalg.svd(linear)
+    if np.linalg.det(vt) < 0:
+        vt, size = -vt, -size
+    if np.linalg.det(u) < 0:
+        u, size = -u, -size
+    return _trs(matrix[:3, 3], u, size), _trs(np.zeros(3), vt, np.ones(3))
+
+
+def _trs(translation: FloatArray, rotation: FloatArray, scale: FloatArray) -> dict[str, Any]:
+    w, x, y, z = quaternion(rotation)
+    trs: dict[str, Any] = {"translation": translation.tolist(), "rotation": [x, y, z, w]}
+    return trs if np.abs(scale - 1).max() < 1e-7 else {**trs, "scale": scale.tolist()}
 
 
 def quaternion(rotation: FloatArray) -> list[float]:
