@@ -19,7 +19,7 @@ from contact_core.solve.body import PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import PenetrationTerm
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.terms import DistanceTerm, NormalTerm, paper_terms
+from contact_core.solve.terms import DistanceTerm, paper_terms
 
 RATE = 24.0
 
@@ -179,8 +179,8 @@ def skating(truth: MotionSolution) -> tuple[MotionProblem, FloatArray]:
     poses = tuple(p.poses(theta)[body] for p, theta in zip(motion.problems, clip, strict=True))
     feet = tuple(c for c in problem.contacts if c.name.startswith("foot"))
     frames = tuple(
-        replace(p, contacts=feet, terms=(DistanceTerm(20.0), NormalTerm(2.0)), length=problem.manipulator_length)
+        replace(p, contacts=feet, terms=(DistanceTerm(),), length=problem.manipulator_length)
         for p in motion.problems
     )
-    weights = MotionWeights(acceleration=3e-4, skate=5.0, follow=100.0)
+    weights = MotionWeights(acceleration=3e-4, skate=50.0, follow=100.0)
     return MotionProblem(motion.frames, frames, RATE, weights, reference={body: poses}), clip

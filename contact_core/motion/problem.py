@@ -31,7 +31,7 @@ class MotionWeights:
     acceleration: float = 3e-4
     skate: float = 0.05
     follow: float = 0.0
-    follow_root: float = 0.01
+    follow_root: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("acceleration", "skate", "follow", "follow_root"):
