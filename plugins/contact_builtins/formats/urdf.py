@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +48,10 @@ class UrdfFiles:
             bounded(len(joints), "joints", MAX_JOINTS)
             joints = _parents_first(links, joints)
             rig, source_faces, notes = _rig(MeshPaths(path, self._roots), links, joints)
+            hands: list[dict[str, Any]] = []
             if told is not None:
                 words = read_sidecar(told)
+                hands = [asdict(hand) for hand in words.hands]
                 rig = replace(
                     rig,
                     freedoms=words.freedoms(rig.joints, rig.freedoms),
@@ -66,7 +68,7 @@ class UrdfFiles:
             meters_per_unit=rig.meters_per_unit,
             up_axis=rig.up_axis,
             notes=(*_joint_notes(joints), *notes),
-            details={"format": "urdf", "influences": 1, "weights_sum_to_1": True, "mimic": mimic},
+            details={"format": "urdf", "influences": 1, "weights_sum_to_1": True, "mimic": mimic, "hands": hands},
         )
 
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Any]) -> None:

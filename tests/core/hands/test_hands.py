@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 
 from contact_builtins.axes.along_bone import AlongBone
 from contact_builtins.formats.gltf import GltfFiles
+from contact_builtins.formats.inspection import hands_of
 from contact_builtins.formats.urdf import UrdfFiles
 from contact_builtins.samples.catalogue import ALIEN_HAND, HUMAN_BODY, HUMAN_HAND, TENTACLE, WITCH_HAND
+from contact_core.cli import main
 from contact_core.contact.axis_generator import AxisRequest
-from contact_core.errors import InvalidInput
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry import SurfacePoints
 from contact_core.hands.describe import describe_hand, describe_hands
 from contact_core.hands.description import Digit, HandDescription, HandWords
@@ -310,3 +312,44 @@ def test_the_allegro_hand_flexes_about_its_hinges(assets: Path) -> None:
             if bone.flexes:
                 assert abs(bone.frame[:, 2] @ rig.freedoms[bone.joint].frame[:, 0]) > 0.999
     assert_closes(rig, hand)
+
+
+def test_a_sidecar_says_what_the_shape_does_not(tmp_path: Path) -> None:
+    """[[hand]] reaches the description and the guessed limits of the file that it lies beside."""
+    asset = HUMAN_HAND.build()
+    GltfFiles().write(tmp_path / "h.glb", [asset], {})
+    (tmp_path / "h.rig.toml").write_text(
+        'schema = 1\n[[hand]]\nhub = "wrist"\npalm = "-z"\nthumb = "thumb_proximal"\n'
+        'digits = { claw = "index_distal" }\n'
+    )
+    read = GltfFiles().read(tmp_path / "h.glb")
+    (hand,) = hands_of(read)
+    assert hand.palm.normal[2] < -0.9 and [d.role for d in hand.digits] == [
+        "thumb",
+        "claw",
+        "middle",
+        "ring",
+        "little",
+    ]
+    rig = read.rig
+    assert rig is not None
+    knuckle = rig.joint_index("index_proximal")
+    palmar = rig.rest_world[knuckle, :3, :3] @ rig.freedoms[knuckle].frame[:, 1]
+    assert palmar[2] < -0.9
+    for text, words in (
+        ("hub = 3", "hub"),
+        ('hub = "wrist"\nside = "up"', "side"),
+        ('hub = "wrist"\npalm = 1', "palm"),
+    ):
+        (tmp_path / "h.rig.toml").write_text(f"schema = 1\n[[hand]]\n{text}\n")
+        with pytest.raises(FileRefused, match=words):
+            GltfFiles().read(tmp_path / "h.glb")
+
+
+def test_inspect_prints_a_hand_and_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asset = ALIEN_HAND.build()
+    GltfFiles().write(tmp_path / "a.glb", [asset], {})
+    assert main(["inspect", str(tmp_path / "a.glb"), "--picture", str(tmp_path / "a.png")]) == 0
+    text = capsys.readouterr().out
+    assert "right hand at wrist" in text and "thumb: thumb_metacarpal" in text and "6 pads" in text
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
