@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,13 +40,21 @@ class UsdFiles:
         rigs = [item.id for item in items if item.kind == "rig"]
         try:
             if len(rigs) == 1:
-                return host.read_rig(rigs[0])
+                rig = host.read_rig(rigs[0])
+                return replace(rig, notes=(*rig.notes, *host.losses()))
             if rigs or not items:
                 found = f"{len(rigs)} rigs ({', '.join(rigs[:6])})" if rigs else "no meshes"
+                found += "".join(f" ({note.rstrip('.')})" for note in host.losses()[:2])
                 raise FileRefused(
                     f"{path} has {found}; as a file it is read where it has one rig, or meshes alone."
                 )
-            return _one_mesh(host, path, [item.id for item in items])
+            from contact_usd.primitives import drawn
+
+            kept, left = drawn({item.id: host.stage.GetPrimAtPath(item.id) for item in items})
+            if not kept:
+                raise FileRefused(f"{path} draws nothing: {' '.join(left)}")
+            asset = _one_mesh(host, path, kept)
+            return replace(asset, notes=(*asset.notes, *left, *host.losses()))
         except InvalidInput as error:
             raise FileRefused(f"{path} cannot be read: {error}") from error
 

@@ -38,6 +38,7 @@ except ImportError as error:
 
 from contact_usd import export, mesh, poses, registration, skel, stage_io, storage
 from contact_usd.layer import LayerUndo
+from contact_usd.primitives import is_primitive, silent_losses
 
 registration.register()
 
@@ -103,9 +104,16 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
             path = str(prim.GetPath())
             if path in self._rigs():
                 found.append(SceneObject(path, prim.GetName(), "rig"))
-            elif prim.IsA(UsdGeom.Mesh) and path not in skinned:
+            elif (prim.IsA(UsdGeom.Mesh) or is_primitive(prim)) and path not in skinned:
                 found.append(SceneObject(path, prim.GetName(), "surface"))
         return tuple(found)
+
+    def losses(self) -> list[str]:
+        """Notes on shapes of the stage that are no objects here, or not all that they could be."""
+        rigs = self._rigs().values()
+        return silent_losses(
+            self.stage, {str(q.GetPrim().GetPath()) for _, b in rigs for q in skel.skinned_meshes(b)}
+        )
 
     def read_surface(self, object_id: str) -> Asset:
         if object_id in self._rigs():
@@ -260,7 +268,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
 
     def _mesh(self, object_id: str) -> Usd.Prim:
         prim = self._prim(object_id)
-        if not prim.IsA(UsdGeom.Mesh):
+        if not (prim.IsA(UsdGeom.Mesh) or is_primitive(prim)):
             raise InvalidInput(f"{object_id} is a {prim.GetTypeName() or 'prim without a type'}, not a Mesh.")
         return prim
 

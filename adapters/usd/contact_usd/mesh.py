@@ -14,6 +14,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
 from contact_core.scene.host import SceneSpace
 from contact_core.scene.reading import surface_of_polygons
+from contact_usd.primitives import is_primitive, solid_of
 from contact_usd.stage_io import reason
 
 AS_IT_STANDS = Usd.TimeCode.EarliestTime()  # a default value, or the first sample where there are only samples
@@ -80,6 +81,10 @@ def array_of(attribute: Usd.Attribute, shape: tuple[int, ...], dtype: type) -> A
 
 def read_arrays(prim: Usd.Prim) -> MeshArrays:
     """The arrays of a UsdGeomMesh. Raises InvalidInput naming the prim when they do not fit together."""
+    if is_primitive(prim):
+        solid_points, solid_faces = solid_of(prim)
+        count = len(solid_faces)
+        return MeshArrays(solid_points, np.full(count, 3), solid_faces.ravel(), np.arange(count), False, ())
     mesh = UsdGeom.Mesh(prim)
     points = array_of(mesh.GetPointsAttr(), (-1, 3), np.float64)
     sizes = array_of(mesh.GetFaceVertexCountsAttr(), (-1,), np.int64)
@@ -155,5 +160,5 @@ def selected_points_of(prim: Usd.Prim, subset: str) -> IntArray:
 
 def subset_names(prim: Usd.Prim) -> tuple[str, ...]:
     """Names of a mesh's GeomSubsets."""
-    subsets = UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Mesh(prim))
+    subsets = UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim))
     return tuple(item.GetPrim().GetName() for item in subsets)

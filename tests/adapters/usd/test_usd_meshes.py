@@ -186,13 +186,13 @@ def test_units_hold_in_a_root_layer_only_and_are_carried_over(tmp_path: Path) ->
 
 def test_what_is_no_mesh_is_refused_in_words(tmp_path: Path) -> None:
     stage = Usd.Stage.CreateNew(str(tmp_path / "odd.usda"))
-    UsdGeom.Cube.Define(stage, "/cube")
+    UsdGeom.Camera.Define(stage, "/cube")
     mesh = define(stage, "/broken", np.eye(4))
     mesh.GetFaceVertexCountsAttr().Set(Vt.IntArray([3, 3]))
     flat = define(stage, "/flat", np.diag([1.0, 1.0, 0.0, 1.0]))
     assert flat
     stage.GetRootLayer().Save()
     host = UsdHost(tmp_path / "odd.usda")
-    for path, word in (("/cube", "Cube"), ("/broken", "add up"), ("/flat", "flat"), ("no path", "no path")):
+    for path, word in (("/cube", "Camera"), ("/broken", "add up"), ("/flat", "flat"), ("no path", "no path")):
         with pytest.raises(InvalidInput, match=word):
             host.read_surface(path)

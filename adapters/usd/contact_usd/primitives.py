@@ -1,0 +1,96 @@
+"""UsdGeom's primitives (Sphere, Cube, Cylinder, Cone, Capsule, Plane) as triangles; what of a stage is drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from contact_core.errors import InvalidInput
+from contact_core.geometry import solids
+
+AS_IT_STANDS = Usd.TimeCode.EarliestTime()
+KINDS = ("Sphere", "Cube", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1", "Plane")
+# columns: where the solid's x, y, z go, so that its z axis lies along the named one
+ALONG = {"X": np.roll(np.eye(3), 1, axis=0), "Y": np.roll(np.eye(3), 2, axis=0), "Z": np.eye(3)}
+
+
+def is_primitive(prim: Usd.Prim) -> bool:
+    """Whether a prim is one of the solids that are read."""
+    return str(prim.GetTypeName()) in KINDS
+
+
+def solid_of(prim: Usd.Prim) -> solids.Solid:
+    """Points (n, 3) and faces (m, 3) in the prim's own space. Raises InvalidInput naming it."""
+    kind = str(prim.GetTypeName())
+    if kind == "Cube":
+        return solids.box(*[_size(prim, "size")] * 3)
+    if kind == "Sphere":
+        return solids.sphere(_size(prim, "radius"))
+    if kind == "Plane":
+        # width lies along x (along z where the plane faces x), length along y (along z where it faces y)
+        axis = prim.GetAttribute("axis").Get(AS_IT_STANDS)
+        width, length = _size(prim, "width"), _size(prim, "length")
+        points, faces = solids.rectangle(*((length, width) if axis in ("X", "Y") else (width, length)))
+        return _along(prim, (points, faces))
+    height = _size(prim, "height")
+    if kind.endswith("_1"):
+        bottom, top = _size(prim, "radiusBottom"), _size(prim, "radiusTop")
+    else:
+        bottom = _size(prim, "radius")
+        top = 0.0 if kind == "Cone" else bottom
+    maker = solids.capsule(bottom, height, top) if kind.startswith("Capsule") else solids.cone(bottom, height, top)
+    return _along(prim, maker)
+
+
+def drawn(prims: dict[str, Usd.Prim]) -> tuple[list[str], list[str]]:
+    """The paths that a renderer draws by default, and notes on the others: guides, proxies, what is invisible."""
+    left: dict[str, list[str]] = {"guides": [], "proxies": [], "invisible": []}
+    kept = []
+    for path, prim in prims.items():
+        shape = UsdGeom.Imageable(prim)
+        purpose = shape.ComputePurpose()
+        if shape.ComputeVisibility(AS_IT_STANDS) == UsdGeom.Tokens.invisible:
+            left["invisible"].append(path)
+        elif purpose == UsdGeom.Tokens.guide:
+            left["guides"].append(path)
+        elif purpose == UsdGeom.Tokens.proxy:
+            left["proxies"].append(path)
+        else:
+            kept.append(path)
+    if not kept and left["proxies"]:
+        kept, left["proxies"] = left["proxies"], []
+    told = [f"not drawn, and left out: {kind} {', '.join(paths[:8])}." for kind, paths in left.items() if paths]
+    return kept, told
+
+
+def silent_losses(stage: Usd.Stage, skinned: set[str]) -> list[str]:
+    """Notes on what a stage holds and this reading does not take: point instances, skins without a SkelRoot."""
+    notes = []
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdGeom.PointInstancer):
+            count = len(UsdGeom.PointInstancer(prim).GetProtoIndicesAttr().Get(AS_IT_STANDS) or ())
+            notes.append(f"{prim.GetPath()} scatters {count} copies (PointInstancer), which are not read.")
+            continue
+        influenced = prim.IsA(UsdGeom.Mesh) and prim.HasAttribute("primvars:skel:jointIndices")
+        if influenced and str(prim.GetPath()) not in skinned:
+            notes.append(
+                f"{prim.GetPath()} has joint influences, but USD does not skin it (no SkelRoot above it, or no"
+                " skeleton bound): it was read as a rigid mesh."
+            )
+    return notes
+
+
+def _size(prim: Usd.Prim, name: str) -> float:
+    value: Any = prim.GetAttribute(name).Get(AS_IT_STANDS)
+    if not isinstance(value, (int, float)) or not 0.0 <= value < float("inf"):
+        raise InvalidInput(f"{prim.GetPath()}: its {name} is {value!r}, where a length must stand.")
+    return float(value)
+
+
+def _along(prim: Usd.Prim, solid: solids.Solid) -> solids.Solid:
+    axis = str(prim.GetAttribute("axis").Get(AS_IT_STANDS))
+    if axis not in ALONG:
+        raise InvalidInput(f"{prim.GetPath()}: its axis is {axis!r}, where X, Y or Z must stand.")
+    return solid[0] @ ALONG[axis].T, solid[1]
