@@ -389,7 +389,7 @@ class Session(PluginVerbs, ProposalVerbs):
             self._check_writable()
             start = self.document
             stroke = Stroke(
-                start, self.revision, self._derived, self.rigs, lambda shown: self._preview(start, shown)
+                start, self.revision, self._derived, self.rigs, lambda shown: self._preview(start, shown), self
             )
             self._under_way.stroke = stroke
             try:

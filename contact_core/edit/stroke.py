@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
+from contact_core.contact.axis_generator import AxisGenerator
+from contact_core.contact.brush import Brush
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, apply_command
 from contact_core.edit.derived import Derived
-from contact_core.edit.verbs import Verbs
+from contact_core.edit.verbs.brushing import BrushVerbs
+from contact_core.edit.verbs.gathering import GatheringVerbs
+from contact_core.edit.verbs.organising import OrganisingVerbs
+from contact_core.edit.verbs.placing import PlacingVerbs
+from contact_core.edit.verbs.reshaping import ReshapingVerbs
 from contact_core.errors import CommandRejected
+from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Rig
 
 
-class Stroke(Verbs):
-    """All verbs, none of which commits: each replaces the preview by what it makes of the starting document.
+class Stroke(BrushVerbs, GatheringVerbs, ReshapingVerbs, PlacingVerbs, OrganisingVerbs):
+    """The verbs that change the document, none of which commits: each replaces the preview by what it makes of the
+    starting document. What reads and writes files is not among them. Brushes and axes by name are those of the
+    session; a brush is made once, at its first use in the stroke.
 
     Nothing accumulates, so a drag there and back ends where it began. When the `with` block of
     `Session.stroke` ends, the last command is committed as one step; when it raises, nothing has happened.
@@ -26,12 +36,15 @@ class Stroke(Verbs):
         derived: Derived,
         rigs: dict[str, Rig],
         preview: Callable[[ContactDocument], None],
+        session: BrushVerbs,
     ) -> None:
         self.rigs = rigs
         self._start = start
         self._revision = revision
         self._derived = derived
         self._preview = preview
+        self._session = session
+        self._brushes: dict[str, Brush] = {}
         self._command: Command | None = None
         self._shown = start
         self._open = True
@@ -50,6 +63,19 @@ class Stroke(Verbs):
     def derived(self) -> Derived:
         """Reconstructed geometry, cached."""
         return self._derived
+
+    def named_brush(self, name: str, **settings: Any) -> Brush:
+        """A brush of the session by name, made at its first use with these settings."""
+        key = repr((name, sorted(settings.items())))
+        if key not in self._brushes:
+            self._brushes[key] = self._session.named_brush(name, **settings)
+        return self._brushes[key]
+
+    def default_axis(
+        self, surface: str, patch: str, points: SurfacePoints, generator: str | AxisGenerator | None
+    ) -> SurfacePoints:
+        """Axis points for a new patch, from an axis generator of the session."""
+        return self._session.default_axis(surface, patch, points, generator)
 
     @property
     def command(self) -> Command | None:

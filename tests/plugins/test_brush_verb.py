@@ -118,12 +118,25 @@ def test_a_drag_with_a_brush_of_a_plugin_previews_and_commits_once() -> None:
         path = over(session, (-0.3, 0.0, 0.9), (0.0, 0.0, 1.0), (0.3, 0.1, 0.9))
         revision, dot = session.revision, session.named_brush("dot")
         with session.stroke() as drag:
-            with pytest.raises(InvalidInput, match="named_brush"):
-                drag.brush("dot", "dots", path, surface="ball", axis=path.path)
+            with pytest.raises(InvalidInput, match="no brush 'dash'"):
+                drag.brush("dash", "dots", path, surface="ball", axis=path.path)
+            assert not hasattr(drag, "export_set") and not hasattr(drag, "import_set")  # no files in a drag
             for radius in (0.1, 0.2):
                 drag.brush(dot, "dots", over(session, (0.0, 0.0, radius)), surface="ball", axis=path.path)
-            drag.brush(dot, "dots", path, surface="ball", axis=path.path)
+            drag.brush("dot", "dots", path, surface="ball", axis=path.path)
+            assert drag.named_brush("dot") is drag.named_brush("dot")
         assert session.revision == revision + 1 and len(session.points("dots")) == 3
         session.paint("whole", path.path, surface="ball", axis=path.path)
         half, whole = (session.document.shape_of(name).weights for name in ("dots", "whole"))
         np.testing.assert_allclose(half, 0.5 * whole)
+
+
+def test_a_new_patch_in_a_drag_gets_the_axis_that_it_gets_without(session: Session) -> None:
+    """By the name of the brush and that of an axis generator; the committed document is the same."""
+    gesture = over(session, (0.0, 1.0, 0.0), (0.3, 0.9, 0.0))
+    session.brush("disk", "side", gesture, surface="ball", generator="principal")
+    directly = dump_document(session.document)
+    session.undo()
+    with session.stroke() as drag:
+        drag.brush("disk", "side", gesture, surface="ball", generator="principal")
+    assert dump_document(session.document) == directly

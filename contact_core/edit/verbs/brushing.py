@@ -43,12 +43,11 @@ class BrushVerbs(PaintingVerbs):
     ) -> int:
         """Paint a patch with a brush, or erase from it where the brush erases; all gestures are one step.
 
-        brush: a name, or the brush itself; within a stroke, where no plugin is looked for, only that. surface,
-        axis, generator, color: of a new patch, as for `paint`. Erased is what lies nearer to a point of a mark,
-        over the surface, than the mark's points lie apart. at: in place of gestures, where the brush passes:
-        surface points, or positions (k, 3) in surface space that are moved to the closest points of the surface.
-        radius, spacing: of that gesture, in surface units; 0 leaves the choice to the brush. settings: the brush's
-        own, such as falloff="smooth".
+        brush: a name, or the brush itself. surface, axis, generator, color: of a new patch, as for `paint`. Erased
+        is what lies nearer to a point of a mark, over the surface, than the mark's points lie apart. at: in place
+        of gestures, where the brush passes: surface points, or positions (k, 3) in surface space that are moved to
+        the closest points of the surface. radius, spacing: of that gesture, in surface units; 0 leaves it to
+        the brush. settings: the brush's own, such as falloff="smooth".
         """
         if isinstance(brush, str):
             tool = self.named_brush(brush, **settings)
