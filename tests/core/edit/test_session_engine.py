@@ -33,6 +33,7 @@ class Straight:
     """Exact, but without chains, and everything `factor` times as far."""
 
     name = "straight"
+    summary = "Exact, but without chains, and everything a factor as far"
     exact = False
     tolerances = EngineTolerances(0.5, 0.5, 0.5)
 
