@@ -41,8 +41,6 @@ def test_built_in_rigs(name: str) -> None:
 )
 def test_rigs_from_files(name: str, assets: Path) -> None:
     path = assets / "rigs" / name
-    if path.suffix == ".urdf":
-        pytest.importorskip("yourdfpy")
     formats = PluginManager().offers(FORMATS).values()
     reader = next(f for f in formats if path.suffix in f.suffixes and f.can_read)
     rig = reader.read(path).rig

@@ -34,6 +34,11 @@ def contact_cli(): return [Publish]
 """
 
 
+def _heed_interrupts() -> None:
+    """Shells have what they run in the background ignore SIGINT, and children inherit that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def publishing(tmp_path: Path) -> subprocess.Popen[str]:
     """A run of the program that stands in the middle of writing a set of files into `out`."""
     (tmp_path / "publishing.py").write_text(PLUGIN)
@@ -44,7 +49,7 @@ def publishing(tmp_path: Path) -> subprocess.Popen[str]:
             "CONTACT_PLUGINS": "publishing",
             "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]),
         },
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=_heed_interrupts,
     )  # fmt: skip
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
     return process
@@ -84,7 +89,9 @@ def test_an_interrupt_at_any_moment_is_a_word(delay: float) -> None:
         "program.signal.signal = told\n"
         "import sys; sys.argv = ['contact', 'plugins']; sys.exit(program.main())"
     )
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=_heed_interrupts
+    )
     assert process.stdout is not None and process.stdout.read(1) == b"x"
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
