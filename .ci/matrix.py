@@ -52,7 +52,9 @@ def prepared(name: str, python: str) -> Path:
         shutil.rmtree(home, ignore_errors=True)
         subprocess.run([python, "-m", "venv", str(home)], check=True)
         install = [str(inside), "-m", "pip", "install", "--quiet", "-c", str(constraints)]
-        subprocess.run([*install, "-e", f"{ROOT}[testing,io,solvers,samples]", "pytest-xdist"], check=True)
+        subprocess.run(
+            [*install, "-e", f"{ROOT}[testing,io,solvers,samples]", "pytest-xdist", "trimesh"], check=True
+        )
         stamp.write_text(wanted)
     return inside
 

@@ -51,7 +51,8 @@ def wound_alike(sides: Sides, faces: int, own_edge: IntArray) -> Winding:
 
 
 def _graph(a: IntArray, b: IntArray, weight: FloatArray, count: int) -> coo_array:
-    return coo_array((weight, (a, b)), shape=(count, count))
+    """(count, count) weights by pairs of nodes; SciPy before 1.15 spans trees over 32-bit indices only."""
+    return coo_array((weight, (a.astype(np.int32), b.astype(np.int32))), shape=(count, count))
 
 
 def _along_tree(
