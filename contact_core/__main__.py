@@ -13,6 +13,7 @@ def main() -> int:
     previous = signal.signal(signal.SIGINT, _leave)  # SIG_IGN where a shell script runs it in the background
     if previous is signal.SIG_IGN:
         signal.signal(signal.SIGINT, previous)
+    sys.unraisablehook = _interrupt_again
     from contact_core.cli import main as run
 
     signal.signal(signal.SIGINT, previous)
@@ -23,6 +24,19 @@ def _leave(number: int, frame: FrameType | None) -> None:
     """End at once: nothing has begun that would need an orderly end, and libraries are half imported."""
     os.write(2, b"contact: interrupted.\n")
     os._exit(130)
+
+
+def _interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
+    """Python drops an interrupt that falls into a weak reference's callback: it comes again a moment later."""
+    if unraisable.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(unraisable)
+        return
+    from _thread import interrupt_main
+    from threading import Timer
+
+    again = Timer(0.02, interrupt_main)
+    again.daemon = True  # a program that ends meanwhile needs no interrupt
+    again.start()
 
 
 if __name__ == "__main__":

@@ -97,3 +97,24 @@ def test_an_interrupt_at_any_moment_is_a_word(delay: float) -> None:
     process.send_signal(signal.SIGINT)
     error = process.communicate(timeout=60)[1]
     assert (process.returncode, error) in ((130, b"contact: interrupted.\n"), (0, b""))
+
+
+def test_an_interrupt_that_python_drops_comes_again() -> None:
+    """One that falls into the callback of a weak reference is ignored by Python, with a traceback."""
+    code = (
+        "import signal, sys, time, weakref\n"
+        "import contact_core.__main__ as program, contact_core.cli as cli\n"
+        "class Thing: pass\n"
+        "def run():\n"
+        "    thing = Thing()\n"
+        "    watched = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))\n"
+        "    try: del thing; time.sleep(30)\n"
+        "    except KeyboardInterrupt: return 130\n"
+        "    return 0\n"
+        "cli.main = run\n"
+        "sys.exit(program.main())"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, preexec_fn=_heed_interrupts, check=False
+    )
+    assert (run.returncode, run.stderr) == (130, "")
