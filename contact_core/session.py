@@ -169,7 +169,7 @@ class Session(PluginVerbs, ProposalVerbs):
         self._file = None
         self._opening_notes = (
             *file.notes,
-            f"the contacts of {file.path.name} live in the scene now; it stays as it is.",
+            f"the contacts of {file.path.name} live in the scene now; the file stays as it is.",
         )
         file.close(in_order=history.is_clean)
 

@@ -130,14 +130,14 @@ class HostLink:
         self._digests[revision] = digest
 
     def undo(self) -> int:
-        """The host's undo; answers the revision then. Raises CommandRejected when the host has nothing to undo."""
+        """The host's undo; returns the revision then. Raises CommandRejected when the host has nothing to undo."""
         if self._undo is None or not self._undo.undo():
             raise CommandRejected("there is nothing to undo in the host.")
         self.follow()
         return self._session.revision
 
     def redo(self) -> int:
-        """The host's redo; answers the revision then. Raises CommandRejected when the host has nothing to redo."""
+        """The host's redo; returns the revision then. Raises CommandRejected when the host has nothing to redo."""
         if self._undo is None or not self._undo.redo():
             raise CommandRejected("there is nothing to redo in the host.")
         self.follow()

@@ -254,7 +254,7 @@ class BlenderHost(
         manager = bpy.context.window_manager
         over = asked or (fraction is not None and fraction >= 1.0)
         if not self._shows_progress and not over:
-            manager.progress_begin(0.0, 1.0)  # the first that is told of a part is rarely 0
+            manager.progress_begin(0.0, 1.0)  # a part of a longer task begins above 0
             self._shows_progress = True
         if fraction is not None and self._shows_progress:
             manager.progress_update(min(max(fraction, 0.0), 1.0))
