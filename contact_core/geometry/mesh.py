@@ -23,6 +23,7 @@ class TriangleMesh:
     """
 
     def __init__(self, points: Any, faces: Any) -> None:
+        self.posed_from: TriangleMesh | None = None
         self.points: FloatArray = frozen(points, np.float64, (None, 3), "points")
         self.faces: IntArray = frozen(faces, np.int64, (None, 3), "faces")
         size = float(np.abs(self.points).max(initial=0.0))
@@ -130,3 +131,10 @@ class TriangleMesh:
         if np.shape(points) != self.points.shape:
             raise InvalidInput(f"points must have shape {self.points.shape}, but have {np.shape(points)}.")
         return TriangleMesh(points, self.faces)
+
+    def posed(self, points: Any) -> TriangleMesh:
+        """The same faces with points (n, 3) of a pose: it remembers the shape at rest (`posed_from`), whose tree
+        is fitted to it in place of a new one."""
+        result = self.with_points(points)
+        result.posed_from = self
+        return result

@@ -50,19 +50,24 @@ class Locator:
     builds: ClassVar[int] = 0  # how many trees this process built: tests guard the cost by counting
     _of_mesh: ClassVar[WeakKeyDictionary[TriangleMesh, Locator]] = WeakKeyDictionary()
 
-    def __init__(self, mesh: TriangleMesh) -> None:
+    def __init__(self, mesh: TriangleMesh, *, like: Locator | None = None) -> None:
+        """like: the locator of the same faces in another shape, whose tree is then fitted to this one."""
         if not len(mesh.faces):
             raise InvalidInput("spatial queries need a mesh with faces, but it has none.")
-        Locator.builds += 1
-        self._tree = box_tree.build(mesh.points, mesh.faces)
+        if like is None:
+            Locator.builds += 1
+            self._tree = box_tree.build(mesh.points, mesh.faces)
+        else:
+            self._tree = box_tree.refitted(like._tree, mesh.points, mesh.faces)
         self._normals = mesh.face_normals
         self._dipoles: box_tree.Dipoles | None = None
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Locator:
-        """The mesh's locator, built at the first call."""
+        """The mesh's locator, built at the first call; that of a posed mesh is its rest shape's, refitted."""
         if mesh not in cls._of_mesh:
-            cls._of_mesh[mesh] = cls(mesh)
+            rest = mesh.posed_from
+            cls._of_mesh[mesh] = cls(mesh, like=None if rest is None else cls.of(rest))
         return cls._of_mesh[mesh]
 
     def cast(self, origins: Any, directions: Any, max_distance: float = np.inf) -> RayHits:

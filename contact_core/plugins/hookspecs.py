@@ -1,6 +1,6 @@
 """Every hook of contact-core, on one screen. Mark an implementation with `contact_core.plugins.hookimpl`.
 
-The first twelve return what a plugin offers: an iterable of objects that satisfy the slot's protocol, or of
+The first thirteen return what a plugin offers: an iterable of objects that satisfy the slot's protocol, or of
 references "package.module:Name" to them, imported when first wanted (a class is then called without arguments),
 so that offering costs nothing and a missing library takes away one object, not a plugin.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from contact_core.solve.problem import PoseProblem
     from contact_core.solve.solver import PoseSolution
 
-API_VERSION = (1, 0)  # a plugin may set CONTACT_API = ">=1.0,<2"; the major number grows when a hook breaks
+API_VERSION = (1, 1)  # a plugin may set CONTACT_API = ">=1.0,<2"; the major number grows when a hook breaks
 Offers: TypeAlias = Iterable[object]
 hookspec = pluggy.HookspecMarker("contact")
 
@@ -45,6 +45,9 @@ def contact_geodesic_engines() -> Offers:
 @hookspec
 def contact_hosts() -> Offers:
     """Hosts: DCCs, stages, viewers: `scene.host.HostAdapter` (classes; a host is opened by its own constructor)."""
+@hookspec
+def contact_tools() -> Offers:
+    """Tools for pointer and keys: `interaction.tool.Tool`."""
 @hookspec
 def contact_formats() -> Offers:
     """File formats: `plugins.slots.Format`."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from contact_core.contact.brush import Brush
     from contact_core.edit.command import Command
     from contact_core.geometry.engine import GeodesicEngine
+    from contact_core.interaction.tool import Tool
     from contact_core.plugins.slots import CliCommand, Format, Placer, Renderer, Sample
     from contact_core.scene.host import HostAdapter
     from contact_core.solve.solver import PoseSolver
@@ -67,6 +68,7 @@ HOSTS: Slot[type[HostAdapter]] = Slot(
     "contact_hosts", "host", "contact_core.scene.host:HostAdapter", instances=False
 )
 FORMATS: Slot[Format] = Slot("contact_formats", "format", "contact_core.plugins.slots:Format")
+TOOLS: Slot[Tool] = Slot("contact_tools", "tool", "contact_core.interaction.tool:Tool")
 RENDERERS: Slot[Renderer] = Slot("contact_renderers", "renderer", "contact_core.plugins.slots:Renderer")
 SAMPLES: Slot[Sample] = Slot("contact_samples", "sample", "contact_core.plugins.slots:Sample")
 COMMANDS: Slot[type[Command]] = Slot(
@@ -83,6 +85,7 @@ SLOTS: tuple[Slot[Any], ...] = (
     POSE_TERMS,
     GEODESIC_ENGINES,
     HOSTS,
+    TOOLS,
     FORMATS,
     RENDERERS,
     SAMPLES,

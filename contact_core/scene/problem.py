@@ -25,7 +25,8 @@ from contact_core.solve.terms import PoseTerm, paper_terms
 class Objective:
     """What is solved for, beside the contacts. The fields are those of `PoseProblem`; bodies are named as surfaces.
 
-    pairs: the names of the pairs that count; all by default.
+    pairs: the names of the pairs that count; all by default. bodies: surfaces that take part though no pair names
+    them: a hand that is dragged by a fingertip.
     """
 
     terms: tuple[PoseTerm, ...] = field(default_factory=paper_terms)
@@ -34,6 +35,7 @@ class Objective:
     held: Mapping[str, Iterable[str]] | None = None
     prior: Literal["rest", "current"] | Mapping[str, Pose] = "rest"
     pairs: tuple[str, ...] | None = None
+    bodies: tuple[str, ...] = ()
 
 
 def problem_of(
@@ -41,18 +43,20 @@ def problem_of(
     rigs: Mapping[str, Rig],
     objective: Objective | None = None,
     evaluated: Mapping[str, HostRig] | None = None,
+    meters_per_unit: float | None = None,
 ) -> PoseProblem:
     """The pose problem of the editor's document: every rig in its pose, everything else where it stands.
 
-    The world is the scene in the units of the first surface of the first pair. rigs: by surface, what may be posed.
-    evaluated: by surface, rigs whose skin only the host can evaluate (`evaluated_rig`). Raises InvalidInput where
-    the mesh of a surface is not loaded.
+    The world is the scene in units of `meters_per_unit`, by default those of the first surface of the first pair.
+    rigs: by surface, what may be posed. evaluated: by surface, rigs whose skin only the host can evaluate
+    (`evaluated_rig`). Raises InvalidInput where the mesh of a surface is not loaded.
     """
     objective, evaluated = objective or Objective(), evaluated or {}
     document = editor.document
     pairs = [pair for pair in editor.pairs() if objective.pairs is None or pair.pair.name in objective.pairs]
     names = dict.fromkeys(name for pair in pairs for name in (pair.manipulator_surface, pair.object_surface))
-    unit = document.surface(next(iter(names))).meters_per_unit if names else 1.0
+    names.update(dict.fromkeys(objective.bodies))
+    unit = meters_per_unit or (document.surface(next(iter(names))).meters_per_unit if names else 1.0)
 
     def body_of(name: str) -> Body:
         world = world_from_surface(document, name, unit)

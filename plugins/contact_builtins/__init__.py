@@ -79,6 +79,13 @@ def contact_hosts() -> list[object]:
 
 
 @hookimpl
+def contact_tools() -> list[object]:
+    return [
+        "contact_builtins.tools.select:Select",
+    ]
+
+
+@hookimpl
 def contact_formats() -> list[object]:
     return [
         "contact_builtins.formats.gltf:GltfFiles",

@@ -1,0 +1,186 @@
+"""What a tool finds before it: the session, the scene as it is seen, selection, settings, and one stroke."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contact_core.document.document import ContactDocument
+from contact_core.edit.command import Command, Macro
+from contact_core.interaction.events import Pointer
+from contact_core.interaction.overlay import Handle, handle_under
+from contact_core.interaction.seen import Hit, SeenScene
+from contact_core.interaction.settings import InteractionSettings, Selection
+from contact_core.interaction.view import View
+from contact_core.plugins.registry import TOOLS, Slot
+from contact_core.proposals.draft import Draft
+from contact_core.solve.terms import PoseTerm
+
+if TYPE_CHECKING:
+    from contact_core.edit.derived import Derived
+    from contact_core.edit.stroke import Stroke
+    from contact_core.interaction.tool import Tool
+    from contact_core.rig.rig import Rig
+    from contact_core.session import Session
+
+
+class Desk:
+    """See the module. Tools read everything; of the document they change only what `stroke` previews.
+
+    view: of the event that is handled. ghost: a proposal's document, which is shown in place of the session's.
+    pins: terms that the live solve adds while a gesture lasts. settled: whether the gesture itself has posed the
+    hand, so that no solve follows it.
+    """
+
+    def __init__(self, session: Session, view: View, *, meters_per_unit: float = 1.0) -> None:
+        self.session, self.view = session, view
+        self.settings = InteractionSettings()
+        self.selection = Selection()
+        self.scene = SeenScene({}, meters_per_unit)
+        self.ghost: ContactDocument | None = None
+        self.pins: tuple[PoseTerm, ...] = ()
+        self.settled = False
+        self._stack: contextlib.ExitStack | None = None
+        self._stroke: Stroke | None = None
+        self._given: dict[tuple[str, str], dict[str, Any]] = {}
+        self._made: dict[tuple[str, str], Any] = {}
+        self.follow()
+
+    # -- reading ---------------------------------------------------------------------------------------------
+
+    @property
+    def document(self) -> ContactDocument:
+        """As it is shown now: what the stroke previews, what is proposed, else the session's."""
+        if self._stroke is not None:
+            return self._stroke.preview_document
+        return self.ghost or self.session.document
+
+    @property
+    def shown(self) -> Draft:
+        """A reader of the shown document with its geometry: axes, roots, points."""
+        return Draft(self.document, self.session.derived, self.session.rigs)
+
+    def follow(self) -> frozenset[str]:
+        """Bring the scene to the shown document; returns the surfaces that moved."""
+        before = self.scene
+        self.scene = before.following(self.document, self.session.known_meshes, self.session.rigs)
+        return self.scene.moved_since(before)
+
+    def pick(self, pointer: Pointer, among: Iterable[str] | None = None) -> Hit | None:
+        """What is under the pointer: on some surfaces, by default on that which tools work on, through all others,
+        or on whatever is in front where there is none such."""
+        if among is None and self.selection.surface in self.scene.surfaces:
+            among = (str(self.selection.surface),)
+        return self.scene.pick(self.view, pointer.pixel, among)
+
+    def patch_at(self, hit: Hit, reach: float = 0.0) -> str | None:
+        """The patch that lies under a hit: the one with the nearest point, where that is no farther than its own
+        points lie apart, or `reach`, world units."""
+        best, name = np.inf, None
+        seen = self.scene.surfaces[hit.surface]
+        for patch in self.document.patches.values():
+            if patch.surface != hit.surface:
+                continue
+            at = seen.positions(self.shown.points(patch.name))
+            away = np.linalg.norm(at - hit.position, axis=1)
+            if len(away) and away.min() < best and away.min() <= max(reach, _spacing(at)):
+                best, name = float(away.min()), patch.name
+        return name
+
+    def handle_at(self, pointer: Pointer, handles: Iterable[Handle]) -> Handle | None:
+        """The handle that a press here takes."""
+        return handle_under(tuple(handles), self.view, pointer.pixel)
+
+    # -- settings --------------------------------------------------------------------------------------------
+
+    def configure(self, slot: Slot[Any], name: str, **values: Any) -> None:
+        """Set settings of a tool, a brush, a solver ...; they hold from now on. Raises InvalidInput."""
+        given = {**self._given.get((slot.hook, name), {}), **values}
+        self._made[slot.hook, name] = self.session.plugins.make(slot, name, **given)
+        self._given[slot.hook, name] = given
+
+    def made(self, slot: Slot[Any], name: str) -> Any:
+        """A tool, a brush, a solver ... by name, with its settings as they are now. Raises InvalidInput."""
+        if (slot.hook, name) not in self._made:
+            self._made[slot.hook, name] = self.session.plugins.make(slot, name)
+        return self._made[slot.hook, name]
+
+    def given(self, slot: Slot[Any], name: str) -> Mapping[str, Any]:
+        """The settings that were set, by name."""
+        return self._given.get((slot.hook, name), {})
+
+    def tool(self, name: str) -> Tool:
+        """A tool by name."""
+        found: Tool = self.made(TOOLS, name)
+        return found
+
+    # -- the stroke ------------------------------------------------------------------------------------------
+
+    @property
+    def stroke(self) -> Stroke:
+        """The stroke of the gesture: its verbs preview, from the document at the press. Opened when first asked
+        for; raises CommandRejected where the session cannot be edited."""
+        if self._stroke is None:
+            with contextlib.ExitStack() as stack:
+                self._stroke = stack.enter_context(self.session.stroke())
+                self._stack = stack.pop_all()
+        return self._stroke
+
+    @property
+    def command(self) -> Command | None:
+        """What the stroke would commit now."""
+        return None if self._stroke is None else self._stroke.command
+
+    def together(self) -> Together:
+        """An editor that gathers several verbs, from the document at the press, for `preview`."""
+        return Together(self.stroke.document, self.session.derived, self.session.rigs)
+
+    def preview(self, title: str, gathered: Together) -> None:
+        """Preview what was gathered as one step. Raises CommandRejected."""
+        self.stroke.submit(Macro(title, tuple(gathered.commands)))
+
+    def commit(self) -> None:
+        """End the stroke with what it previews, as one step of the session; nothing where it previews nothing."""
+        stack, self._stack = self._stack, None
+        try:
+            if stack is not None:
+                stack.close()
+        finally:
+            self._over()
+
+    def roll_back(self) -> None:
+        """End the stroke with nothing: the document is the very one of the press."""
+        if self._stroke is not None:
+            if self._stroke.document is self.session.document:  # else a host went elsewhere, and ended it
+                self._stroke.cancel()
+            self._stroke.abandon()
+        self.commit()
+
+    def _over(self) -> None:
+        self._stroke, self.pins, self.settled = None, (), False
+        self.follow()
+
+
+class Together(Draft):
+    """A draft that remembers its commands."""
+
+    def __init__(self, document: ContactDocument, derived: Derived, rigs: Mapping[str, Rig]) -> None:
+        super().__init__(document, derived, rigs)
+        self.commands: list[Command] = []
+
+    def submit(self, command: Command, *, origin: str = "user") -> int:
+        self.commands.append(command)
+        return super().submit(command, origin=origin)
+
+
+def _spacing(at: Any) -> float:
+    """About how far the points (n, 3) of a patch lie apart: twice the median distance to the nearest other."""
+    if len(at) < 2:
+        return 0.0
+    from scipy.spatial import cKDTree
+
+    some = at[:: max(len(at) // 64, 1)]
+    return 2.0 * float(np.median(cKDTree(at).query(some, k=2)[0][:, 1]))

@@ -1,0 +1,117 @@
+"""What actions do to the selection and to the whole document; each is one step of the session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from contact_core.contact.placement import Link
+from contact_core.edit.command import Command, Macro
+from contact_core.edit.commands import Remove, Unpair
+from contact_core.errors import CommandRejected
+from contact_core.interaction.settings import Selection
+
+if TYPE_CHECKING:
+    from contact_core.interaction.desk import Desk
+
+
+def _chosen(desk: Desk) -> tuple[str, ...]:
+    """The selected patches. Raises CommandRejected where there is none."""
+    if not desk.selection.patches:
+        raise CommandRejected("no patch is selected: click one first.")
+    return desk.selection.patches
+
+
+def remove(desk: Desk) -> None:
+    """Remove the selected patches; what hangs on them stays."""
+    desk.session.remove(*_chosen(desk))
+
+
+def clear(desk: Desk) -> None:
+    """Remove every patch, and so every pair."""
+    if not desk.session.document.patches:
+        raise CommandRejected("there are no contacts to clear.")
+    desk.session.do(Macro("Clear contacts", (Remove(tuple(desk.session.document.patches), ()),)))
+
+
+def mirror(desk: Desk) -> None:
+    """Turn the selected patches into their mirror images."""
+    with desk.session.macro("Mirror " + ", ".join(_chosen(desk))):
+        for patch in _chosen(desk):
+            desk.session.mirror(patch)
+
+
+def detach(desk: Desk) -> None:
+    """Give the active patch a shape of its own."""
+    desk.session.detach(_chosen(desk)[-1])
+
+
+def unlink(desk: Desk) -> None:
+    """Take the selected patches off their parents."""
+    document = desk.session.document
+    linked = [name for name in _chosen(desk) if isinstance(document.patch(name).placement, Link)]
+    if not linked:
+        raise CommandRejected("none of the selected patches hangs on another.")
+    with desk.session.macro("Unlink " + ", ".join(linked)):
+        for patch in linked:
+            desk.session.unlink(patch)
+
+
+def unpair(desk: Desk) -> None:
+    """Dissolve the pairs of the selected patches."""
+    chosen = set(_chosen(desk))
+    pairs = [p.name for p in desk.session.document.pairs.values() if {p.manipulator, p.object} & chosen]
+    if not pairs:
+        raise CommandRejected("none of the selected patches is paired.")
+    commands: tuple[Command, ...] = tuple(map(Unpair, pairs))
+    desk.session.do(Macro("Unpair " + ", ".join(sorted(chosen)), commands))
+
+
+def default_axis(desk: Desk) -> None:
+    """Lay the axis of the active patch anew, by the default generator."""
+    desk.session.set_axis(_chosen(desk)[-1])
+
+
+def rest(desk: Desk) -> None:
+    """Put every hand back to rest."""
+    posed = list(desk.session.document.poses)
+    if not posed:
+        raise CommandRejected("every hand is at rest already.")
+    with desk.session.macro("Rest pose"):
+        for surface in posed:
+            desk.session.clear_pose(surface)
+
+
+def other_surface(desk: Desk) -> None:
+    """Tools work on the next surface, after the last on whatever is in front."""
+    names: list[str | None] = [*desk.scene.surfaces, None]
+    here = names.index(desk.selection.surface) if desk.selection.surface in names else len(names) - 1
+    desk.selection = replace(desk.selection, surface=names[(here + 1) % len(names)])
+
+
+def select_nothing(desk: Desk) -> None:
+    """No patch, and whatever surface is in front."""
+    desk.selection = Selection()
+
+
+def select_all(desk: Desk) -> None:
+    """Every patch of the surface that tools work on, of all surfaces where there is none such."""
+    document, surface = desk.session.document, desk.selection.surface
+    names = (patch.name for patch in document.patches.values() if surface in (None, patch.surface))
+    desk.selection = replace(desk.selection, patches=tuple(names))
+
+
+EDITS: Mapping[str, Callable[[Desk], None]] = {
+    "selection.remove": remove,
+    "selection.clear": clear,
+    "selection.mirror": mirror,
+    "selection.detach": detach,
+    "selection.unlink": unlink,
+    "selection.unpair": unpair,
+    "selection.axis": default_axis,
+    "selection.surface": other_surface,
+    "selection.none": select_nothing,
+    "selection.all": select_all,
+    "pose.rest": rest,
+}

@@ -1,0 +1,438 @@
+"""The interaction: events in, edits of the session out, and what a front end has to draw again.
+
+interaction = Interaction(session)
+taken = interaction.handle(Pointer("press", 412.5, 300.5, "left"), view)   # not taken: the camera gets it
+...
+if interaction.advance():            # once a frame, before drawing: the live solve, work that is over
+    changes = interaction.changes()  # what to send to the screen
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from contact_core.errors import ContactError, InvalidInput
+from contact_core.interaction.actions import Action, action_of, actions_of
+from contact_core.interaction.desk import Desk
+from contact_core.interaction.drawing import DocumentDrawing
+from contact_core.interaction.editing import EDITS
+from contact_core.interaction.events import Event, Key, Pointer
+from contact_core.interaction.live import LiveSolve
+from contact_core.interaction.overlay import NOTHING, Overlay
+from contact_core.interaction.proposing import Proposing
+from contact_core.interaction.settings import InteractionSettings, Selection
+from contact_core.interaction.tool import Gesture, Tool
+from contact_core.interaction.view import Perspective, View
+from contact_core.interaction.work import Worker, WorkStatus
+from contact_core.plugins.registry import TOOLS, Slot
+from contact_core.settings import configured
+
+if TYPE_CHECKING:
+    from contact_core.edit.announcer import DocumentChanged
+    from contact_core.session import Session
+
+Part: TypeAlias = Literal["document", "overlay", "selection", "tool", "settings", "status", "work", "visibility"]
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What changed since the last call. surfaces: those whose points or places moved, or that came or went. parts:
+    what else a front end may show."""
+
+    surfaces: frozenset[str] = frozenset()
+    parts: frozenset[Part] = frozenset()
+
+    def __bool__(self) -> bool:
+        return bool(self.surfaces or self.parts)
+
+
+@dataclass(frozen=True)
+class Status:
+    """The line of status. refusal: the last sentence that something was refused with, until the next event that
+    works. solve_ms: of the last live solve. step: what undo would take back."""
+
+    tool: str
+    hint: str
+    surface: str | None
+    refusal: str
+    solve_ms: float | None
+    work: WorkStatus | None
+    proposed: str
+
+    def line(self) -> str:
+        """All of it as one line of text."""
+        parts = [self.tool, f"on {self.surface}" if self.surface else "", self.hint, self.proposed]
+        if self.work is not None:
+            share = "" if self.work.fraction is None else f" {100 * self.work.fraction:.0f} %"
+            parts.append(f"{self.work.title}{share} {self.work.text}".strip())
+        if self.solve_ms is not None:
+            parts.append(f"solve {self.solve_ms:.0f} ms")
+        return " · ".join(part for part in [*parts, self.refusal] if part)
+
+
+class Interaction:
+    """One artist at one session, in one or several views. It is for the session's thread.
+
+    session: what is edited. meters_per_unit: of the world that views look at. A tool is in the hand from the start:
+    `select`, or the first that is offered.
+    """
+
+    def __init__(self, session: Session, *, meters_per_unit: float = 1.0) -> None:
+        nowhere = Perspective.looking_at((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        self.session = session
+        self.desk = Desk(session, nowhere, meters_per_unit=meters_per_unit)
+        self.worker = Worker()
+        self.proposing = Proposing(self.desk, self.worker)
+        self._drawing = DocumentDrawing(self.desk)
+        self._gesture: Gesture | None = None
+        self._button = "none"
+        self._live: LiveSolve | None = None
+        self._camera_has: set[str] = set()
+        self._hover: Overlay = NOTHING
+        self._refusal = ""
+        self._moved: set[str] = set(self.desk.scene.surfaces)
+        self._parts: set[Part] = {"document", "overlay", "selection", "tool", "settings", "status", "visibility"}
+        offered = list(session.plugins.offers(TOOLS))
+        self._tool = "select" if "select" in offered else (offered or [""])[0]
+        self._stop_listening = session.listen(self._follow)
+
+    def close(self) -> None:
+        """Put back what is under way, stop the work, and listen no more. The session stays open."""
+        self.cancel()
+        self.worker.drop()
+        self._stop_listening()
+
+    # -- what is in the hand ---------------------------------------------------------------------------------
+
+    @property
+    def tools(self) -> tuple[Tool, ...]:
+        """All tools, with their settings."""
+        return tuple(self.desk.tool(name) for name in self.session.plugins.offers(TOOLS))
+
+    @property
+    def tool(self) -> str:
+        """The name of the tool in the hand, "" where no tool is offered."""
+        return self._tool
+
+    def take_up(self, name: str) -> None:
+        """Take up a tool; a gesture under way is put back. Raises InvalidInput for a name that is not offered."""
+        self.desk.tool(name)
+        self.cancel()
+        self._tool, self._hover = name, NOTHING
+        self._touch("tool", "overlay", "status")
+
+    @property
+    def settings(self) -> InteractionSettings:
+        """What holds for all tools."""
+        return self.desk.settings
+
+    def set(self, **values: Any) -> None:
+        """Set some of `settings` by name. Raises InvalidInput."""
+        self.desk.settings = configured(self.desk.settings, values, "the interaction")
+        self._touch("settings", "overlay", "status", "visibility")
+
+    def configure(self, slot: Slot[Any], name: str, **values: Any) -> None:
+        """Set settings of a tool, a brush, an axis generator, a solver or a term by name. Raises InvalidInput."""
+        self.desk.configure(slot, name, **values)
+        self._touch("settings", "overlay", "status")
+
+    @property
+    def selection(self) -> Selection:
+        """What is selected."""
+        return self.desk.selection
+
+    def select(self, *patches: str, surface: str | None = None) -> None:
+        """Select patches, the active one last, and the surface that tools work on; by default that stays.
+
+        Raises CommandRejected for a name that the document does not have.
+        """
+        for name in patches:
+            self.desk.document.patch(name)
+        if surface is not None:
+            self.desk.document.surface(surface)
+        self.desk.selection = replace(self.desk.selection, patches=patches,
+                                      surface=surface or self.desk.selection.surface)  # fmt: skip
+        self._touch("selection", "overlay", "status", "visibility")
+
+    def opacity(self, surface: str) -> float:
+        """How a front end draws a surface: 1 solid, 0 not at all, between them as a ghost."""
+        mine = self.desk.selection.surface
+        if mine is None or surface == mine:
+            return 1.0
+        return 0.0 if self.settings.isolate else 0.35 if self.settings.xray else 1.0
+
+    # -- events ----------------------------------------------------------------------------------------------
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a gesture is under way."""
+        return self._gesture is not None
+
+    def handle(self, event: Event, view: View) -> bool:
+        """Take an event, or leave it to the camera and the front end's own actions: whether it was taken.
+
+        What is refused is told by `status`; no ContactError comes out of here, and whatever is raised leaves the
+        document of the press and no open stroke.
+        """
+        self.desk.view = view
+        try:
+            return self._key(event) if isinstance(event, Key) else self._pointer(event)
+        except ContactError as error:
+            self._refused(error)
+            return True
+        except BaseException:
+            self.cancel()
+            raise
+
+    def advance(self) -> bool:
+        """Do what is due, once a frame: the live solve for the newest state, and what long work has found.
+
+        Whether anything is to be drawn again.
+        """
+        try:
+            if self._live is not None and self._live.follow():
+                self._touch("status")
+            if self.worker.status is not None:
+                self._touch("work", "status")
+            self.worker.poll()
+        except ContactError as error:
+            self._refused(error)
+        except BaseException:
+            self.cancel()
+            raise
+        return bool(self._moved or self._parts)
+
+    def cancel(self) -> None:
+        """Put back the gesture that is under way: the document is the very one of the press."""
+        gesture = self._gesture
+        if gesture is not None:
+            self._over()
+            self.desk.roll_back()
+            gesture.cancel()
+
+    def _pointer(self, event: Pointer) -> bool:
+        if self._gesture is not None:
+            return self._in_gesture(self._gesture, event)
+        if event.kind == "press":
+            return self._press(event)
+        if event.kind == "release":
+            self._camera_has.discard(event.button)
+        elif event.kind == "leave":
+            self._show_hover(NOTHING)
+        elif event.kind == "move" and not self._camera_has and self._tool:
+            self._show_hover(self.desk.tool(self._tool).hover(self.desk, event))
+        return False
+
+    def _press(self, event: Pointer) -> bool:
+        if event.button != "left" or not self._tool:
+            self._camera_has.add(event.button)
+            return False
+        self._refusal = ""
+        selection = self.desk.selection
+        try:
+            gesture = self.desk.tool(self._tool).press(self.desk, event)
+        except ContactError:
+            self.desk.roll_back()
+            raise
+        if self.desk.selection is not selection:
+            self._touch("selection", "visibility")
+        if gesture is None:
+            self.desk.roll_back()
+            self._camera_has.add(event.button)
+            return False
+        self._begin(gesture, event.button)
+        return True
+
+    def _begin(self, gesture: Gesture, button: str) -> None:
+        """button: which ends it; "none" where the next press does."""
+        self._gesture, self._button, self._hover = gesture, button, NOTHING
+        self._live = LiveSolve(self.desk)
+        self._touch("overlay", "status")
+
+    def _in_gesture(self, gesture: Gesture, event: Pointer) -> bool:
+        """Every event is the gesture's while it lasts: a camera that moved meanwhile would move what is dragged."""
+        if event.kind == "move":
+            gesture.move(event)
+            self._refusal = ""
+            self._touch("overlay", "status")
+        elif event.kind == "press" and event.button == "right":
+            self.cancel()
+        elif (event.kind == "press" and self._button == "none") or (
+            event.kind == "release" and event.button == self._button
+        ):
+            self._release(gesture, event)
+        return True
+
+    def _release(self, gesture: Gesture, event: Pointer) -> None:
+        """Commit what the gesture leaves, with the pose that follows, as one step; nothing where it refuses."""
+        live = self._live
+        selection = self.desk.selection
+        try:
+            gesture.release(event)
+            if live is not None:
+                live.follow()
+        except ContactError:
+            self.cancel()
+            raise
+        self._over()
+        self.desk.commit()
+        if self.desk.selection is not selection:
+            self._touch("selection", "visibility")
+
+    def _over(self) -> None:
+        self._gesture, self._live, self._button = None, None, "none"
+        self._touch("overlay", "status")
+
+    def _show_hover(self, overlay: Overlay) -> None:
+        if overlay is not self._hover:
+            self._hover = overlay
+            self._touch("overlay")
+
+    # -- keys ------------------------------------------------------------------------------------------------
+
+    @property
+    def actions(self) -> tuple[Action, ...]:
+        """The table of actions and keys, tools among them."""
+        return actions_of(self.tools)
+
+    def _key(self, key: Key) -> bool:
+        action = action_of(key, self.actions)
+        if action is None or action.by_host:
+            return self._gesture is not None
+        self.do(action.id)
+        return True
+
+    def do(self, action: str) -> None:
+        """Do an action by its id. Raises ContactError with a sentence, InvalidInput for one that is not known or
+        is the host's."""
+        found = next((each for each in self.actions if each.id == action and not each.by_host), None)
+        if found is None:
+            raise InvalidInput(f"the interaction has no action {action!r}; see `Interaction.actions`.")
+        self._refusal = ""
+        if found.group == "tool":
+            self.take_up(action.removeprefix("tool."))
+        elif action == "edit.cancel":
+            self._cancel_something()
+        elif action == "edit.accept" and self._gesture is not None:
+            pass  # a gesture is accepted by letting go
+        else:
+            if self._gesture is not None:
+                self.cancel()
+                if action == "edit.undo":
+                    return  # the gesture was the last thing done
+            self._own_actions().get(action, lambda: EDITS[action](self.desk))()
+        self._touch("overlay", "selection", "status", "settings", "visibility")
+
+    def _own_actions(self) -> dict[str, Callable[[], object]]:
+        settings = self.settings
+        return {
+            "edit.undo": self.session.undo,
+            "edit.redo": self.session.redo,
+            "edit.accept": self.proposing.accept,
+            "edit.larger": lambda: self.resize(1.15),
+            "edit.smaller": lambda: self.resize(1.0 / 1.15),
+            "edit.radius": self._begin_radius,
+            "pose.solve": self.proposing.solve,
+            "pose.settle": self.proposing.settle,
+            "pose.slide": self.proposing.slide,
+            "pose.live": lambda: self.set(live=not settings.live),
+            "show.xray": lambda: self.set(xray=not settings.xray),
+            "show.isolate": lambda: self.set(isolate=not settings.isolate),
+        }
+
+    def _cancel_something(self) -> None:
+        """The innermost thing: the gesture, the work, the proposal."""
+        if self._gesture is not None:
+            self.cancel()
+        elif self.worker.status is not None:
+            self.worker.cancel()
+        else:
+            self.proposing.dismiss()
+        self._touch("overlay", "status", "work")
+
+    def resize(self, factor: float) -> None:
+        """Make the radius of the tool in the hand larger by a factor. Raises InvalidInput where it has none."""
+        resized = getattr(self.desk.tool(self._tool), "resized", None)
+        if resized is None:
+            raise InvalidInput(f"the tool {self._tool!r} has no radius.")
+        self.configure(TOOLS, self._tool, radius=resized(self.desk, factor))
+
+    def _begin_radius(self) -> None:
+        self._begin(RadiusGesture(self), "none")
+
+    # -- what a front end shows ------------------------------------------------------------------------------
+
+    def overlay(self) -> Overlay:
+        """All that is drawn over the scene now."""
+        own = self._hover if self._gesture is None else self._gesture.overlay()
+        return self._drawing.overlay().joined(self.proposing.overlay()).joined(own)
+
+    def changes(self) -> Changes:
+        """What changed since the last call."""
+        found = Changes(frozenset(self._moved), frozenset(self._parts))
+        self._moved, self._parts = set(), set()
+        return found
+
+    @property
+    def status(self) -> Status:
+        """For the line of status."""
+        hint = self.desk.tool(self._tool).hint if self._tool else ""
+        if self._gesture is not None:
+            hint = self._gesture.hint() or hint
+        solve_ms = self._live.milliseconds if self._live is not None and self._live.solves else None
+        return Status(self._tool, hint, self.selection.surface, self._refusal, solve_ms, self.worker.status,
+                      self.proposing.summary)  # fmt: skip
+
+    # -- inside ----------------------------------------------------------------------------------------------
+
+    def _follow(self, change: DocumentChanged) -> None:
+        """The session's document changed, by whomever."""
+        if change.kind != "preview":
+            self.proposing.forget()
+            if self._gesture is not None and change.kind != "do":
+                self._over()
+                self.desk.roll_back()
+            self._keep_selection()
+        moved = self.desk.follow()
+        self._moved |= moved
+        self._touch("document", "overlay")
+
+    def _keep_selection(self) -> None:
+        """Only what there is can be selected."""
+        document, selection = self.session.document, self.desk.selection
+        patches = tuple(name for name in selection.patches if name in document.patches)
+        surface = selection.surface if selection.surface in document.surfaces else None
+        if (patches, surface) != (selection.patches, selection.surface):
+            self.desk.selection = replace(selection, patches=patches, surface=surface)
+            self._touch("selection", "visibility")
+
+    def _refused(self, error: ContactError) -> None:
+        self._refusal = str(error)
+        self._touch("status")
+
+    def _touch(self, *parts: Part) -> None:
+        self._parts.update(parts)
+
+
+class RadiusGesture(Gesture):
+    """The radius of the brush by moving the pointer, without a button: twice as large every 120 pixels."""
+
+    def __init__(self, interaction: Interaction) -> None:
+        self._interaction = interaction
+        self._before = getattr(interaction.desk.tool(interaction.tool), "radius", None)
+        self._start: Pointer | None = None
+        interaction.resize(1.0)  # refuses a tool that has no radius
+
+    def move(self, pointer: Pointer) -> None:
+        self._start = self._start or pointer
+        doublings = (pointer.x - self._start.x) / (120.0 * self._interaction.desk.view.pixel_ratio)
+        self.cancel()
+        self._interaction.resize(2.0 ** min(max(doublings, -6.0), 6.0))
+
+    def cancel(self) -> None:
+        self._interaction.configure(TOOLS, self._interaction.tool, radius=self._before)
+
+    def hint(self) -> str:
+        return "move to set the radius, click to keep it"

@@ -1,0 +1,126 @@
+"""Solve, settle and slide beside the window: begun here, found on a thread, shown as a ghost, then accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from contact_core.document.document import ContactDocument
+from contact_core.edit.derived import Derived
+from contact_core.errors import CommandRejected
+from contact_core.interaction.overlay import Ghost, Overlay
+from contact_core.interaction.work import Worker
+from contact_core.plugins.registry import POSE_TERMS
+from contact_core.progress import Progress
+from contact_core.proposals.draft import Draft
+from contact_core.scene.problem import Objective
+from contact_core.solve.terms import paper_terms
+
+if TYPE_CHECKING:
+    from contact_core.interaction.desk import Desk
+    from contact_core.proposals.proposal import Proposal, SolveSettings
+
+_GHOST = (0.55, 0.75, 1.0)
+Find = Callable[[ContactDocument, Draft, "SolveSettings"], "Proposal"]
+
+
+class Proposing:
+    """What is proposed now, and the work that finds it. The worker gets documents and meshes, never the session."""
+
+    def __init__(self, desk: Desk, worker: Worker) -> None:
+        self._desk, self._worker = desk, worker
+        self.proposal: Proposal | None = None
+
+    @property
+    def summary(self) -> str:
+        """What is proposed, in a few words; "" for nothing."""
+        if self.proposal is None:
+            return ""
+        residuals = self.proposal.after.patches.values()
+        worst = max((residual.p95 for residual in residuals), default=0.0)
+        return f"proposed: contacts within {worst:.3g}; Enter keeps it, Escape leaves it"
+
+    def solve(self) -> None:
+        """Begin to solve the pose."""
+        from contact_core.proposals.proposal import solve
+
+        plugins, revision = self._desk.session.plugins, self._desk.session.revision
+        self._begin("Solve", lambda start, draft, settings: solve(start, draft, plugins, revision, settings))
+
+    def settle(self) -> None:
+        """Begin to settle the contacts and solve the pose."""
+        from contact_core.proposals.proposal import settle
+
+        plugins, revision = self._desk.session.plugins, self._desk.session.revision
+        self._begin("Settle", lambda start, draft, settings: settle(start, draft, plugins, revision, settings))
+
+    def slide(self) -> None:
+        """Begin to let contacts slide with the pose."""
+        from contact_core.proposals.proposal import slide
+
+        plugins, revision = self._desk.session.plugins, self._desk.session.revision
+        self._begin("Slide", lambda start, draft, settings: slide(start, draft, plugins, revision, settings))
+
+    def _begin(self, title: str, find: Find) -> None:
+        from contact_core.proposals.proposal import SolveSettings
+
+        session, settings = self._desk.session, self._desk.settings
+        if not session.document.pairs:
+            raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
+        self.dismiss()
+        terms = paper_terms(prior=settings.prior_weight)
+        if settings.penetration and settings.penetration_weight > 0.0 and session.plugins.offers(POSE_TERMS):
+            name = session.plugins.name_for(POSE_TERMS, "depth")
+            terms += (session.plugins.make(POSE_TERMS, name, weight=settings.penetration_weight),)
+        poses = dict(session.document.poses)
+        objective = Objective(terms) if settings.prior == "rest" else Objective(terms, prior=poses)
+        start, known, rigs = session.document, dict(session.known_meshes), dict(session.rigs)
+        read = session.binding.read(start)  # as the scene has it; the host is asked here and not on the thread
+        solver = settings.solver
+        engine = session.derived.engine
+
+        def work(progress: Progress) -> Proposal:
+            draft = Draft(read, Derived(known, engine), rigs)
+            return find(start, draft, SolveSettings(solver, objective=objective, progress=progress))
+
+        self._worker.begin(title, work, self.show)
+
+    def show(self, proposal: Proposal) -> None:
+        """Show a proposal in place of the document, until it is accepted or dismissed.
+
+        Raises CommandRejected where the document has changed since it was begun.
+        """
+        if proposal.revision != self._desk.session.revision:
+            raise CommandRejected("the document has changed since this was begun: solve again.")
+        self.proposal, self._desk.ghost = proposal, proposal.ghost
+        self._desk.session.show_ghost(proposal)
+
+    def accept(self) -> None:
+        """Commit what is proposed, as one step. Raises CommandRejected where nothing is."""
+        proposal = self.proposal
+        if proposal is None:
+            raise CommandRejected("nothing is proposed: solve first.")
+        self.forget()
+        self._desk.session.accept(proposal)
+
+    def dismiss(self) -> None:
+        """Back to the document."""
+        if self.proposal is not None:
+            proposal = self.proposal
+            self.forget()
+            self._desk.session.dismiss(proposal)
+
+    def forget(self) -> None:
+        """The document moved on: what was proposed for another is nothing now."""
+        self.proposal, self._desk.ghost = None, None
+
+    def overlay(self) -> Overlay:
+        """The hand as it was, behind the one that is proposed."""
+        if self.proposal is None:
+            return Overlay()
+        session, desk = self._desk.session, self._desk
+        before = desk.scene.following(session.document, session.known_meshes, session.rigs)
+        moved = before.moved_since(desk.scene) & before.surfaces.keys()
+        return Overlay(ghosts=tuple(
+            Ghost(before.surfaces[name].points, before.surfaces[name].mesh.faces, _GHOST) for name in sorted(moved)
+        ))  # fmt: skip

@@ -1,0 +1,104 @@
+"""Long work beside the window: one piece at a time on a thread of its own, taken over on the session's thread.
+
+The work gets only values (documents, meshes) and a progress; what it returns is handed to `done` when the front
+end's loop calls `poll`. So a session stays with one thread, and whatever the artist does meanwhile stands.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from contact_core.errors import Cancelled, ContactError
+from contact_core.progress import Progress
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class WorkStatus:
+    """How far the work is. fraction: 0 to 1, None where nobody knows."""
+
+    title: str
+    fraction: float | None
+    text: str
+
+
+class _Piece(Progress):
+    """One piece of work on its thread; it is its own progress."""
+
+    def __init__(self, title: str, work: Callable[[Progress], Any], done: Callable[[Any], None]) -> None:
+        self.title, self.done = title, done
+        self.status = WorkStatus(title, None, "")
+        self.result: Any = None
+        self.error: BaseException | None = None
+        self.stop = threading.Event()
+        self.over = threading.Event()
+        self._work = work
+        self.thread = threading.Thread(target=self._run, name=f"contact {title}", daemon=True)
+        self.thread.start()
+
+    def tell(self, fraction: float | None, text: str) -> None:
+        self.status = WorkStatus(self.title, fraction, text)
+        if self.stop.is_set():
+            raise Cancelled(f"{self.title} was cancelled.")
+
+    def _run(self) -> None:
+        try:
+            self.result = self._work(self)
+        except BaseException as error:  # told where it can be shown
+            self.error = error
+        self.over.set()
+
+
+class Worker:
+    """At most one piece of work; a new one takes the place of the old, whose result is dropped."""
+
+    def __init__(self) -> None:
+        self._piece: _Piece | None = None
+
+    @property
+    def status(self) -> WorkStatus | None:
+        """Of the work that runs; None where none does."""
+        return None if self._piece is None else self._piece.status
+
+    def begin(self, title: str, work: Callable[[Progress], Any], done: Callable[[Any], None]) -> None:
+        """Start: `work` on a thread, then `done` with what it returns, in `poll`."""
+        self.drop()
+        self._piece = _Piece(title, work, done)
+
+    def cancel(self) -> None:
+        """Ask the work to stop; solvers then return the best they have, which `poll` hands over."""
+        if self._piece is not None:
+            self._piece.stop.set()
+
+    def drop(self) -> None:
+        """Stop the work and forget what it finds."""
+        self.cancel()
+        self._piece = None
+
+    def poll(self) -> bool:
+        """Hand over the result of work that is over; whether there was one.
+
+        On the session's thread. Raises what the work raised, a ContactError for people.
+        """
+        piece = self._piece
+        if piece is None or not piece.over.is_set():
+            return False
+        self._piece = None
+        piece.thread.join()
+        if piece.error is None:
+            piece.done(piece.result)
+        elif isinstance(piece.error, ContactError):
+            raise piece.error
+        else:
+            log.error("%s failed", piece.title, exc_info=piece.error)
+            raise ContactError(f"{piece.title} failed by a mistake in the program: {piece.error}") from piece.error
+        return True
+
+    def wait(self, seconds: float | None = None) -> bool:
+        """Until the work is over, at most so long; whether it is. For scripts and tests."""
+        return self._piece is None or self._piece.over.wait(seconds)
