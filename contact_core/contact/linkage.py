@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from contact_core.contact.axis import Axis
-from contact_core.contact.placement import Link
+from contact_core.contact.placement import Link, Root, Walk
 from contact_core.errors import InvalidInput
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.mesh import TriangleMesh
@@ -62,3 +62,16 @@ def follow_link(mesh: TriangleMesh, parent_axis: Axis, link: Link) -> tuple[Surf
     trace = trace_chains(mesh, start, np.array([first]), np.array([0, len(rest)]), np.array(link.turns), rest)
     tangent = complex(trace.headings[0]) * complex(np.exp(1j * link.heading))
     return trace.points, tangent, float(trace.remaining[0])
+
+
+def follow_walk(mesh: TriangleMesh, walk: Walk) -> Root:
+    """Where a walk ends."""
+    start, first = walk.start, walk.start.heading * complex(np.exp(1j * walk.direction))
+    if sum(walk.lengths) == 0.0:
+        return start.heading_to(first * complex(np.exp(1j * walk.heading)))
+    rest = np.array(walk.lengths[1:])
+    offsets = np.array([0, len(rest)])
+    trace = trace_chains(
+        mesh, start.point(), np.array([walk.lengths[0] * first]), offsets, np.array(walk.turns), rest
+    )
+    return Root.at(trace.points, complex(trace.headings[0]) * complex(np.exp(1j * walk.heading)))

@@ -74,14 +74,9 @@ class Link:
     own_point: int = 0
 
     def __post_init__(self) -> None:
-        if len(self.lengths) != len(self.turns) + 1:
-            raise InvalidInput(
-                f"a link of {len(self.turns)} turns has one length more, but got {len(self.lengths)} lengths."
-            )
-        if not all(math.isfinite(x) for x in (self.direction, self.heading, *self.lengths, *self.turns)):
-            raise InvalidInput("the angles and lengths of a link are finite numbers.")
-        if min(self.lengths) < 0.0 or min(self.parent_point, self.own_point) < 0:
-            raise InvalidInput("the lengths and axis points of a link are not negative.")
+        check_chain(self.lengths, self.turns, (self.direction, self.heading), "a link")
+        if min(self.parent_point, self.own_point) < 0:
+            raise InvalidInput("the axis points of a link are not negative.")
 
     def mirrored(self) -> Link:
         """The mirror image: every angle negated."""
@@ -93,4 +88,39 @@ class Link:
         return replace(self, lengths=tuple(factor * length for length in self.lengths))
 
 
-Placement = Root | Link
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A place on the way between two roots, as patches have while they slide from one key to the next.
+
+    The walk leaves `start` at `direction` from its heading (radians), runs lengths[0], turns by turns[0] at a
+    saddle vertex, and so on (surface units, radians); the heading lies at `heading` from its ending direction. The
+    walk alone says where it ends: it never goes over to another shortest path.
+    """
+
+    json_union: ClassVar[bool] = True
+    start: Root
+    direction: float
+    lengths: tuple[float, ...]
+    turns: tuple[float, ...]
+    heading: float
+
+    def __post_init__(self) -> None:
+        check_chain(self.lengths, self.turns, (self.direction, self.heading), "a walk")
+
+    @property
+    def face(self) -> int:
+        """Where it starts."""
+        return self.start.face
+
+
+def check_chain(lengths: tuple[float, ...], turns: tuple[float, ...], angles: tuple[float, ...], what: str) -> None:
+    """Straight legs with a turn between each two of them. Raises InvalidInput."""
+    if len(lengths) != len(turns) + 1:
+        raise InvalidInput(f"{what} of {len(turns)} turns has one length more, but got {len(lengths)} lengths.")
+    if not all(map(math.isfinite, (*angles, *lengths, *turns))):
+        raise InvalidInput(f"the angles and lengths of {what} are finite numbers.")
+    if min(lengths) < 0.0:
+        raise InvalidInput(f"the lengths of {what} are not negative.")
+
+
+Placement = Root | Link | Walk

@@ -17,7 +17,9 @@ from contact_core.arrays import FloatArray, frozen
 from contact_core.contact.placement import Link, Placement
 from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.timeline import FILM, Span, Timeline, Track, gain_of, of_address
 from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.geometry.transform import is_rigid
 from contact_core.rig.rig import Pose
 
 Color = tuple[float, float, float]
@@ -46,9 +48,7 @@ class Surface:
         check_name(self.name, "a surface")
         matrix = frozen(self.world_from_surface, np.float64, (4, 4), "world_from_surface")
         object.__setattr__(self, "world_from_surface", matrix)
-        turn = matrix[:3, :3]
-        rigid = np.abs(turn).max() < 1.1 and np.abs(turn @ turn.T - np.eye(3)).max() <= 1e-6
-        if not rigid or np.linalg.det(turn) < 0.0 or np.abs(matrix[3] - [0.0, 0.0, 0.0, 1.0]).max() > 1e-9:
+        if not is_rigid(matrix):
             raise InvalidInput(
                 f"world_from_surface of {self.name!r} must be rigid: apply scale and shear to the points instead."
             )
@@ -88,12 +88,16 @@ class Patch:
 
 @dataclass(frozen=True, slots=True)
 class ContactPair:
-    """Two patches that are to touch, and how much this pair counts."""
+    """Two patches that are to touch, how much this pair counts, and how far it is on.
+
+    gain: 0 is off, 1 is on; unlike weights, the gain of one pair leaves the others as strong as they were.
+    """
 
     name: str
     manipulator: str
     object: str
     weight: float = 1.0
+    gain: float = 1.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a pair")
@@ -101,6 +105,8 @@ class ContactPair:
             raise InvalidInput(f"a pair joins two patches, but {self.object!r} came twice.")
         if not 0.0 <= self.weight < np.inf:
             raise InvalidInput(f"the weight of a pair is not negative, but {self.weight} came.")
+        if not 0.0 <= self.gain <= 1.0:
+            raise InvalidInput(f"the gain of a pair is 0..1, but {self.gain} came.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +114,9 @@ class ContactDocument:
     """The whole document; every part a read-only mapping by name.
 
     shapes: by key. groups: names of patches that belong together across surfaces. poses: by surface, the pose its
-    rig is in. extras: JSON values of hosts and plugins by namespace ("host.blender").
+    rig is in. extras: JSON values of hosts and plugins by namespace ("host.blender"). timelines: under "film" the
+    range and the rate, if they were set. tracks: by address
+    (`timeline.address`), keys of what changes over time. spans: by pair, when it holds; always where none are.
     """
 
     surfaces: FrozenMap[Surface] = field(default_factory=FrozenMap)
@@ -118,6 +126,52 @@ class ContactDocument:
     groups: FrozenMap[tuple[str, ...]] = field(default_factory=FrozenMap)
     poses: FrozenMap[Pose] = field(default_factory=FrozenMap)
     extras: FrozenMap[Any] = field(default_factory=FrozenMap)
+    timelines: FrozenMap[Timeline] = field(default_factory=FrozenMap)
+    tracks: FrozenMap[Track] = field(default_factory=FrozenMap)
+    spans: FrozenMap[tuple[Span, ...]] = field(default_factory=FrozenMap)
+
+    @property
+    def timeline(self) -> Timeline:
+        """The range and the rate of the film; one frame where nobody has set any."""
+        return self.timelines.get(FILM, Timeline())
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether anything in it changes over time."""
+        return bool(self.tracks or self.spans)
+
+    def at(self, frame: float) -> ContactDocument:
+        """The document as it is at a frame, without tracks and spans: every value is what it comes to there.
+
+        The very same document where nothing changes over time. A patch between two keys has a `Walk` for its
+        placement, so no mesh is needed.
+        """
+        if not self.is_timed:
+            return self
+        patches, surfaces, pairs, poses = (
+            dict[str, Any](part) for part in (self.patches, self.surfaces, self.pairs, self.poses)
+        )
+        for where, track in self.tracks.items():
+            kind, name = of_address(where)
+            if kind == "placement":
+                patches[name] = replace(patches[name], placement=track.placement_at(frame))
+            elif kind == "place":
+                surfaces[name] = replace(surfaces[name], world_from_surface=track.place_at(frame))
+            elif kind == "weight":
+                pairs[name] = replace(pairs[name], weight=track.weight_at(frame))
+            else:
+                poses[name] = track.pose_at(frame)
+        for name, spans in self.spans.items():
+            pairs[name] = replace(pairs[name], gain=gain_of(spans, frame))
+        return replace(
+            self,
+            surfaces=FrozenMap(surfaces),
+            patches=FrozenMap(patches),
+            pairs=FrozenMap(pairs),
+            poses=FrozenMap(poses),
+            tracks=FrozenMap(),
+            spans=FrozenMap(),
+        )
 
     def patch(self, name: str) -> Patch:
         """The patch. Raises CommandRejected naming those that exist."""

@@ -15,6 +15,7 @@ from contact_core.contact.shape import PatchShape
 from contact_core.document.codec import Fragment, from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, Patch, is_name
 from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.time_checks import time_inconsistencies
 from contact_core.errors import EditedFile, FileRefused
 
 SCHEMA = "contact-core.document"
@@ -61,8 +62,8 @@ def document_digest(document: ContactDocument) -> str:
 
     It is taken over the bytes that `dump_document` writes, without the line that states the digest itself. So two
     documents have the same digest exactly when a saved file of one is, byte for byte, a saved file of the other:
-    all surfaces, patches, shapes, pairs, groups, poses and extras, the schema name and its version count; the path,
-    the revision, the history and the layout of a file do not. It is the same in every process, on every platform,
+    everything in it, the schema name and its version count; the path, the revision, the history and the layout of a
+    file do not. It is the same in every process, on every platform,
     until the version of the schema rises. It does not identify a history: two histories may lead to one document.
     """
     return _digest(_content(document))
@@ -177,6 +178,7 @@ def inconsistencies(document: ContactDocument) -> Iterator[str]:
             yield f"a pose names the surface {name!r}, which does not exist."
         if len(set(pose.joints)) != len(pose.joints):
             yield f"the pose of {name!r} names a joint twice."
+    yield from time_inconsistencies(document)
     for kind, names in (("a group", document.groups), ("a namespace", document.extras)):
         for name in names:
             if not is_name(name):

@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import TypeVar, cast
 
 from contact_core.contact.axis import Axis, reconstruct_axis, root_from_point
-from contact_core.contact.linkage import follow_link
+from contact_core.contact.linkage import follow_link, follow_walk
 from contact_core.contact.patch import PatchPoints, points_from_axis
-from contact_core.contact.placement import Link, Root
+from contact_core.contact.placement import Link, Root, Walk
 from contact_core.document.document import ContactDocument
 from contact_core.errors import InvalidInput
 from contact_core.geometry.engine import EXACT, GeodesicEngine
@@ -107,8 +107,12 @@ class Derived:
     def _root_and_cut(self, document: ContactDocument, name: str) -> tuple[Root, float]:
         """The root, and the length that boundaries cut off on the way to it from the parents (0 without)."""
         link = document.patch(name).placement
-        if not isinstance(link, Link):
+        if isinstance(link, Root):
             return link, 0.0
+        if isinstance(link, Walk):
+            walk, mesh = link, self.mesh(document, document.patch(name).surface)
+            surface = document.surface(document.patch(name).surface).digest
+            return self._cached(("root", surface, walk), 1, lambda: (follow_walk(mesh, walk), 0.0))
         key = ("root", self._axis_key(document, link.parent), link, self._shape_key(document, name))
         return self._cached(key, 1, lambda: self._linked_root(document, name, link))
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from contact_core.contact.placement import Link, Placement
+from contact_core.contact.placement import Link, Placement, Walk
 from contact_core.document.codec import to_json
 from contact_core.document.document import ContactDocument, Patch
 from contact_core.document.schema import dump_document
@@ -77,6 +77,15 @@ def changes(before: ContactDocument, after: ContactDocument) -> Iterator[str]:
     yield from _named_changes("group", before.groups, after.groups)
     yield from _named_changes("pose of", before.poses, after.poses)
     yield from _named_changes("data of", before.extras, after.extras)
+    yield from _time_changes(before, after)
+
+
+def _time_changes(before: ContactDocument, after: ContactDocument) -> Iterator[str]:
+    if before.timeline != after.timeline:
+        first, last = after.timeline.first, after.timeline.last
+        yield f"timeline: frames {first:g} to {last:g} at {after.timeline.frames_per_second:g} per second"
+    yield from _named_changes("keys of", before.tracks, after.tracks)
+    yield from _named_changes("spans of", before.spans, after.spans)
 
 
 def _patch_changes(before: ContactDocument, after: ContactDocument, old: Patch, new: Patch) -> Iterator[str]:
@@ -122,6 +131,9 @@ def _placement_changes(old: Placement, new: Placement) -> Iterator[str]:
         yield f"now hangs on {new.parent}"
     elif isinstance(old, Link):
         yield f"unlinked from {old.parent}"
+    elif isinstance(old, Walk) or isinstance(new, Walk):
+        if old != new:
+            yield "moved along the surface"
     elif (old.face, old.barycentric) != (new.face, new.barycentric):
         yield f"moved to face {new.face}" if new.face != old.face else f"moved within face {new.face}"
     elif old.heading != new.heading:

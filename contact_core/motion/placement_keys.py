@@ -13,19 +13,18 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
 from contact_core.arrays import ComplexArray
-from contact_core.contact.placement import Root
+from contact_core.contact.placement import Root, Walk, check_chain
 from contact_core.errors import InvalidInput
-from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.geometry.tracing import trace_chains
 
 Interpolation = Literal["smooth", "linear", "hold"]
+INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +39,7 @@ class Way:
     heading: float
 
     def __post_init__(self) -> None:
-        if len(self.lengths) != len(self.turns) + 1:
-            raise InvalidInput(
-                f"a way of {len(self.turns)} turns has one length more, but got {len(self.lengths)} lengths."
-            )
-        if not all(map(math.isfinite, (self.direction, self.heading, *self.lengths, *self.turns))):
-            raise InvalidInput("the angles and lengths of a way are finite numbers.")
-        if min(self.lengths) < 0.0:
-            raise InvalidInput("the lengths of a way are not negative.")
+        check_chain(self.lengths, self.turns, (self.direction, self.heading), "a way")
 
     @property
     def length(self) -> float:
@@ -62,6 +54,8 @@ class Way:
     @classmethod
     def between(cls, mesh: TriangleMesh, first: Root, second: Root) -> Way:
         """The shortest. Raises InvalidInput where the surface does not connect the two."""
+        from contact_core.geometry.exact_geodesics import log_map
+
         log = log_map(mesh, first.point(), second.point())
         if log.anchor[0] < 0:
             raise InvalidInput("two keys of a placement lie on parts of the surface that are not connected.")
@@ -81,6 +75,7 @@ class PlacementKey:
     """root: where the patch is at a frame. way: to the next key, None at the last. interpolation: up to the next
     key, smooth (speeds run on through keys, Fritsch and Carlson 1980, and rest at the ends), linear, or hold."""
 
+    json_union: ClassVar[bool] = True
     frame: float
     root: Root
     way: Way | None = None
@@ -89,7 +84,7 @@ class PlacementKey:
     def __post_init__(self) -> None:
         if not math.isfinite(self.frame):
             raise InvalidInput(f"a frame is a finite number, but {self.frame} came.")
-        if self.interpolation not in ("smooth", "linear", "hold"):
+        if self.interpolation not in INTERPOLATIONS:
             raise InvalidInput(f'keys are joined by "smooth", "linear" or "hold", but got {self.interpolation!r}.')
 
 
@@ -172,8 +167,20 @@ class PlacementKeys:
         index, share = self.share(frame)
         return self.keys[index].root if share == 0.0 else Root.at(points, complex(headings[0]))
 
+    def placement_at(self, frame: float) -> Root | Walk:
+        """The same as a placement, for which no mesh is needed: at a key its root, else a walk from one."""
+        index, share = self.share(frame)
+        key = self.keys[index]
+        direction, lengths, turns, heading = _walk(key, share)
+        if share == 0.0:
+            return key.root
+        bearing = cmath.phase(direction / key.root.heading)
+        return Walk(key.root, bearing, tuple(lengths), tuple(turns), heading)
+
     def sampled(self, mesh: TriangleMesh, frames: Sequence[float]) -> tuple[SurfacePoints, ComplexArray]:
         """Roots (n) and headings (n,) at frames, walked in one batch."""
+        from contact_core.geometry.tracing import trace_chains
+
         where = [self.share(frame) for frame in frames]
         walks = [_walk(self.keys[index], share) for index, share in where]
         offsets = np.cumsum([0, *(len(walk[1]) - 1 for walk in walks)])

@@ -67,7 +67,9 @@ class PoseKeys:
         poses = tuple(keys[f] for f in frames)
         if not self.is_cubic:
             return PoseKeys(self.rig, frames, poses)
-        speeds = dict(zip(self.frames, self.speeds, strict=True)) | {float(frame): _passing(frames, poses, frame)}
+        speeds = dict(zip(self.frames, self.speeds, strict=True)) | {
+            float(frame): passing_speeds(frames, poses, frame)
+        }
         return PoseKeys(self.rig, frames, poses, tuple(speeds[f] for f in frames))
 
     def without_key(self, frame: float) -> PoseKeys:
@@ -117,13 +119,20 @@ class PoseCurves:
     @classmethod
     def of(cls, rig: Rig, keys: PoseKeys) -> PoseCurves:
         """The channels of keys on a rig. Joints that a pose does not name stand at rest."""
-        translations, quaternions, stretches = channels(np.array([pose_on(rig, pose) for pose in keys.poses]))
-        frames = np.array(keys.frames)
-        if not keys.is_cubic:
-            return cls(frames, translations, quaternions, stretches)
-        speeds = np.array([_speeds_on(rig, p, s) for p, s in zip(keys.poses, keys.speeds, strict=True)])
+        speeds = None
+        if keys.is_cubic:
+            speeds = np.array([_speeds_on(rig, p, s) for p, s in zip(keys.poses, keys.speeds, strict=True)])
+        return cls.joined(keys.frames, np.array([pose_on(rig, pose) for pose in keys.poses]), speeds)
+
+    @classmethod
+    def joined(cls, frames: Sequence[float], local: FloatArray, speeds: FloatArray | None) -> PoseCurves:
+        """The channels of joint transforms (k, j, 4, 4) with speeds (k, j, 6), or None for straight blends."""
+        translations, quaternions, stretches = channels(local)
+        at = np.array(frames, float)
+        if speeds is None:
+            return cls(at, translations, quaternions, stretches)
         return cls(
-            frames, translations, quaternions, stretches, speeds[..., :3],
+            at, translations, quaternions, stretches, speeds[..., :3],
             quaternion_slopes(quaternions, speeds[..., 3:]),
         )  # fmt: skip
 
@@ -221,7 +230,7 @@ def _speeds_on(rig: Rig, pose: Pose, speeds: FloatArray) -> FloatArray:
     return result
 
 
-def _passing(frames: tuple[float, ...], poses: tuple[Pose, ...], frame: float) -> FloatArray:
+def passing_speeds(frames: tuple[float, ...], poses: tuple[Pose, ...], frame: float) -> FloatArray:
     """(j, 6) speeds at a key from the poses before and after it, for the joints that all three name."""
     at = frames.index(float(frame))
     pose = poses[at]

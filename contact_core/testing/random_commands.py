@@ -15,10 +15,12 @@ import numpy as np
 from contact_core.contact.placement import Link, Root
 from contact_core.document.document import ContactDocument, ContactPair
 from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.timeline import Key, Span, Timeline, Track, address, of_address
 from contact_core.edit import commands as kinds
 from contact_core.edit.command import Command
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected
+from contact_core.motion.placement_keys import PlacementKey
 from contact_core.rig.rig import Pose
 from contact_core.testing.random_values import (
     Rng,
@@ -33,6 +35,8 @@ from contact_core.testing.random_values import (
     random_motion,
     random_root,
     random_shape,
+    random_track,
+    random_way,
 )
 
 Maker = Callable[[ContactDocument, Rng], Command | None]
@@ -100,13 +104,18 @@ def rebind_surface(document: ContactDocument, rng: Rng) -> Command | None:
     roots = [patch for patch in document.patches.values() if patch.surface == new.name]
     places = tuple((p.name, random_root(rng, new)) for p in roots if isinstance(p.placement, Root))
     owned = {patch.shape for patch in roots if patch.original}
+    tracks = {
+        where: random_track(rng, "placement", frames=track.frames, surface=new)
+        for where, track in document.tracks.items()
+        if (end := of_address(where))[0] == "placement" and document.patches[end[1]].surface == new.name
+    }
     shapes = {
         key: replace(document.shapes[key], weights=document.shapes[key].weights * 0.5)
         if rng.random() < 0.7
         else random_shape(rng, len(document.shapes[key]))  # another axis, of more points or fewer
         for key in owned
     }
-    return kinds.RebindSurface(new, FrozenMap(shapes), places)
+    return kinds.RebindSurface(new, FrozenMap(shapes), places, FrozenMap(tracks))
 
 
 def settle(document: ContactDocument, rng: Rng) -> Command | None:
@@ -295,6 +304,61 @@ def set_extra(document: ContactDocument, rng: Rng) -> Command | None:
     return kinds.SetExtra(f"host.{rng.integers(3)}", value)
 
 
+def set_timeline(document: ContactDocument, rng: Rng) -> Command | None:
+    first = float(rng.integers(0, 50))
+    rate = ((24, 1), (24000, 1001), (60, 1))[int(rng.integers(3))]
+    return kinds.SetTimeline(Timeline(rate, first, first + float(rng.integers(0, 200))))
+
+
+def set_keys(document: ContactDocument, rng: Rng) -> Command | None:
+    known = pick(rng, list(document.tracks))
+    if known and rng.random() < 0.7:
+        track = document.tracks[known]
+        kind, name = of_address(known)
+        frame = float(rng.choice(track.frames)) if rng.random() < 0.5 else float(rng.integers(100))
+        if frame in track.frames[1:] and rng.random() < 0.5 and kind != "placement":
+            return kinds.SetKeys(known, (), (frame,))
+        surface = document.surfaces[document.patches[name].surface] if kind == "placement" else None
+        return kinds.SetKeys(known, beside(track, random_track(rng, kind, (frame,), surface).keys[0], rng))
+    choices = [address("placement", p.name) for p in document.patches.values() if isinstance(p.placement, Root)]
+    choices += [address("pose", s.name) for s in document.surfaces.values() if s.rig]
+    choices += [address("place", name) for name in document.surfaces]
+    choices += [address("weight", name) for name in document.pairs]
+    where = pick(rng, choices)
+    if where is None:
+        return None
+    kind, name = of_address(where)
+    surface = document.surfaces[document.patches[name].surface] if kind == "placement" else None
+    frames = tuple(sorted(rng.choice(100, int(rng.integers(1, 5)), replace=False).astype(float).tolist()))
+    if where in document.tracks:
+        return None
+    return kinds.SetKeys(where, random_track(rng, kind, frames, surface).keys)
+
+
+def beside(track: Track, key: Key, rng: Rng) -> tuple[Key, ...]:
+    """A key with what it changes of the ways beside it."""
+    if not isinstance(key, PlacementKey):
+        return (key,)
+    before = [other for other in track.of(PlacementKey) if other.frame < key.frame]
+    after = [other for other in track.frames if other > key.frame]
+    put: list[Key] = [replace(key, way=random_way(rng) if after else None)]
+    if before and before[-1].way is None:
+        put.append(replace(before[-1], way=random_way(rng)))
+    return tuple(put)
+
+
+def clear_track(document: ContactDocument, rng: Rng) -> Command | None:
+    where = pick(rng, list(document.tracks))
+    return where and kinds.ClearTrack(where)
+
+
+def set_spans(document: ContactDocument, rng: Rng) -> Command | None:
+    name = pick(rng, list(document.pairs))
+    ends = np.sort(rng.choice(100, 2 * int(rng.integers(0, 3)), replace=False)).astype(float).reshape(-1, 2)
+    spans = tuple(Span(on, off, *rng.uniform(0.0, 12.0, 2).tolist()) for on, off in ends.tolist())
+    return name and kinds.SetSpans(name, spans)
+
+
 def macro(document: ContactDocument, rng: Rng) -> Command | None:
     first = bend(document, rng) or recolor(document, rng)
     second = set_extra(document, rng)
@@ -335,4 +399,8 @@ MAKERS: dict[str, Maker] = {
     "surface.rebind": rebind_surface,
     "surface.remove": remove_surface,
     "surface.rename": rename_surface,
+    "timeline.clear": clear_track,
+    "timeline.keys": set_keys,
+    "timeline.set": set_timeline,
+    "timeline.spans": set_spans,
 }

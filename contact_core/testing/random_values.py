@@ -11,6 +11,9 @@ from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Link, Placement, Root
 from contact_core.contact.shape import AxisShape, PatchCoordinates, PatchShape
 from contact_core.document.document import ContactDocument, Patch, Surface
+from contact_core.document.timeline import Key, PlaceKey, PoseKey, Track, WeightKey
+from contact_core.motion.placement_keys import PlacementKey, Way
+from contact_core.rig.rig import Pose
 
 Rng = np.random.Generator
 
@@ -89,6 +92,32 @@ def moved_placement(document: ContactDocument, rng: Rng, patch: Patch) -> Placem
     if isinstance(patch.placement, Link):
         return random_link(rng, document, patch.placement.parent, patch)
     return random_root(rng, document.surface(patch.surface))
+
+
+def random_way(rng: Rng) -> Way:
+    """From one placement key to the next."""
+    turns = int(rng.integers(0, 3))
+    lengths, angles = rng.uniform(0.0, 1.0, turns + 1), rng.uniform(-3.0, 3.0, turns + 2)
+    return Way(float(angles[0]), tuple(lengths.tolist()), tuple(angles[2:].tolist()), float(angles[1]))
+
+
+def random_track(rng: Rng, kind: str, frames: Sequence[float], surface: Surface | None = None) -> Track:
+    """Keys of a kind at frames; of a placement, on a surface."""
+
+    def key(frame: float, is_last: bool) -> Key:
+        how = pick(rng, ["smooth", "linear", "hold"])
+        if kind == "placement":
+            assert surface is not None
+            return PlacementKey(frame, random_root(rng, surface), None if is_last else random_way(rng), how)
+        if kind == "weight":
+            return WeightKey(frame, float(rng.uniform(0.0, 2.0)), how)
+        if kind == "place":
+            return PlaceKey(frame, random_motion(rng), how)
+        local = np.array([random_motion(rng), random_motion(rng)])
+        speeds = rng.uniform(-0.1, 0.1, (2, 6)) if rng.random() < 0.5 else None
+        return PoseKey(frame, Pose(("wrist", "thumb"), local), speeds, how, pick(rng, ["", "5eed"]))
+
+    return Track(tuple(key(float(frame), frame == frames[-1]) for frame in frames))
 
 
 def random_motion(rng: Rng) -> FloatArray:

@@ -32,11 +32,13 @@ from contact_core.edit.commands.surfaces import (
     RenameSurface,
     SetPose,
 )
+from contact_core.edit.commands.timing import ClearTrack, SetKeys, SetSpans, SetTimeline
 
 __all__ = [
     "AddSurface",
     "Bend",
     "ClearPose",
+    "ClearTrack",
     "Detach",
     "Erase",
     "Extend",
@@ -58,7 +60,10 @@ __all__ = [
     "Rotate",
     "Scale",
     "SetExtra",
+    "SetKeys",
     "SetPose",
+    "SetSpans",
+    "SetTimeline",
     "Settle",
     "Transfer",
     "Translate",

@@ -12,6 +12,7 @@ from contact_core.document.document import Color, ContactDocument, ContactPair, 
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.command import BaseCommand, Command
 from contact_core.edit.commands.checks import add_patches, check_free
+from contact_core.edit.commands.timing import with_tracks_renamed, without_stray_time
 from contact_core.errors import CommandRejected
 
 
@@ -46,7 +47,7 @@ class Unpair(BaseCommand):
 
     def apply(self, document: ContactDocument) -> ContactDocument:
         named(document.pairs, self.pair, "pair")
-        return replace(document, pairs=document.pairs.without(self.pair))
+        return without_stray_time(replace(document, pairs=document.pairs.without(self.pair)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +114,7 @@ class Rename(BaseCommand):
             for pair in document.pairs.values()
         }
         groups = {name: tuple(new(member) for member in members) for name, members in document.groups.items()}
+        document = with_tracks_renamed(document, ("placement",), new)
         return replace(
             document, patches=FrozenMap(patches), pairs=FrozenMap(pairs), groups=FrozenMap(groups)
         )  # fmt: skip

@@ -20,6 +20,7 @@ from contact_core.edit.commands.checks import (
     place_all,
     without_unused_shapes,
 )
+from contact_core.edit.commands.timing import without_stray_time
 from contact_core.errors import CommandRejected
 
 
@@ -187,7 +188,7 @@ class Remove(BaseCommand):
             pairs=document.pairs.without(*pairs) if pairs else document.pairs,
             groups=type(document.groups)(groups) if changed else document.groups,
         )
-        return without_unused_shapes(_with_originals(document))
+        return without_stray_time(without_unused_shapes(_with_originals(document)))
 
 
 def _with_originals(document: ContactDocument) -> ContactDocument:

@@ -9,6 +9,7 @@ from typing import ClassVar
 from contact_core.contact.placement import Link, Placement, Root
 from contact_core.document.document import ContactDocument, Patch
 from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.timeline import address
 from contact_core.edit.command import BaseCommand, Command
 from contact_core.edit.commands.checks import NamedPlacements, add_patches, check_placement
 from contact_core.edit.commands.surfaces import SetPose
@@ -192,6 +193,8 @@ class LinkPatch(BaseCommand):
     def apply(self, document: ContactDocument) -> ContactDocument:
         patch = document.patch(self.patch)
         check_placement(document, patch, self.link)
+        if address("placement", self.patch) in document.tracks:
+            raise CommandRejected(f"{self.patch!r} has keys of its own place: clear them before it is linked.")
         return document.with_patches(replace(patch, placement=self.link))
 
 

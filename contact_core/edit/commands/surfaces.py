@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,8 +11,11 @@ from contact_core.arrays import FloatArray, frozen
 from contact_core.contact.shape import PatchShape
 from contact_core.document.document import ContactDocument, Surface, named
 from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.time_checks import time_inconsistencies
+from contact_core.document.timeline import Track
 from contact_core.edit.command import BaseCommand, Command
 from contact_core.edit.commands.checks import NamedPlacements, check_free, check_links, place_all
+from contact_core.edit.commands.timing import with_tracks_renamed, without_stray_time
 from contact_core.errors import CommandRejected
 from contact_core.rig.rig import Pose
 
@@ -47,11 +50,12 @@ class RemoveSurface(BaseCommand):
         on_it = [patch.name for patch in document.patches.values() if patch.surface == self.surface]
         if on_it:
             raise CommandRejected(f"{self.surface!r} holds the patches {', '.join(on_it[:5])}: remove them first.")
-        return replace(
+        left = replace(
             document,
             surfaces=document.surfaces.without(self.surface),
             poses=document.poses.without(self.surface),
         )
+        return without_stray_time(left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +79,9 @@ class RenameSurface(BaseCommand):
         poses = {(self.name if name == old.name else name): pose for name, pose in document.poses.items()}
         moved = [patch for patch in document.patches.values() if patch.surface == old.name]
         document = replace(document, surfaces=FrozenMap(surfaces), poses=FrozenMap(poses))
+        document = with_tracks_renamed(
+            document, ("pose", "place"), lambda name: self.name if name == old.name else name
+        )
         return document.with_patches(*(replace(patch, surface=self.name) for patch in moved))
 
 
@@ -106,12 +113,14 @@ class RebindSurface(BaseCommand):
     """A surface becomes another mesh; shapes and placements hold what was projected onto it.
 
     surface: the new record under the old name. shapes: by key, those drawn anew. placements: new roots and links.
+    tracks: by address, keys of places on it with their new roots and ways.
     """
 
     json_id: ClassVar[str] = "surface.rebind"
     surface: Surface
     shapes: FrozenMap[PatchShape]
     placements: NamedPlacements
+    tracks: FrozenMap[Track] = field(default_factory=FrozenMap)
 
     def label(self) -> str:
         return f"Rebind {self.surface.name}"
@@ -124,6 +133,7 @@ class RebindSurface(BaseCommand):
             document,
             surfaces=document.surfaces.with_item(self.surface.name, self.surface),
             shapes=document.shapes.updated(self.shapes),
+            tracks=document.tracks.updated(self.tracks),
         )
         document = place_all(document, self.placements)
         for patch in document.patches.values():
@@ -131,6 +141,8 @@ class RebindSurface(BaseCommand):
             if patch.surface == self.surface.name and face >= self.surface.faces:
                 raise CommandRejected(f"the root of {patch.name!r} is not on the new {self.surface.name!r}.")
         check_links(document)
+        for trouble in time_inconsistencies(document):
+            raise CommandRejected(trouble)
         return document
 
 

@@ -74,6 +74,7 @@ def test_drags_merge() -> None:
     assert merging >= {
         "contact.translate", "contact.rotate", "contact.bend", "contact.scale", "contact.mirror",
         "contact.recolor", "contact.pair", "document.extra", "pose.set", "surface.place",
+        "timeline.keys", "timeline.set", "timeline.spans",
     }  # fmt: skip
 
 
