@@ -115,8 +115,8 @@ class ContactDocument:
 
     shapes: by key. groups: names of patches that belong together across surfaces. poses: by surface, the pose its
     rig is in. extras: JSON values of hosts and plugins by namespace ("host.blender"). timelines: under "film" the
-    range and the rate, if they were set. tracks: by address
-    (`timeline.address`), keys of what changes over time. spans: by pair, when it holds; always where none are.
+    range and the rate, if they were set. tracks: by address (`timeline.address`), keys of what changes over time.
+    spans: by pair, when it holds; always where none are.
     """
 
     surfaces: FrozenMap[Surface] = field(default_factory=FrozenMap)

@@ -75,6 +75,7 @@ def problem_of(
             pair.object_surface,
             pair.object_points,
             pair.weights,
+            pair.pair.gain,
         )
         for pair in pairs
     )

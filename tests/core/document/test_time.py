@@ -207,7 +207,7 @@ def test_times_that_mean_nothing_are_refused_in_words() -> None:
     ("says", "field", "value"),
     [
         ("one timeline", "timelines", {"other": {"rate": [24, 1], "first": 0.0, "last": 1.0}}),
-        ("names the pair", "spans", {"nobody": [{"on": 0.0, "off": 1.0}]}),
+        ("name the pair", "spans", {"nobody": [{"on": 0.0, "off": 1.0}]}),
         ("has none", "spans", {"timed": []}),
         ("does not exist", "tracks", {"pose/nobody": {"keys": [{"is": "WeightKey", "frame": 0.0, "weight": 1.0}]}}),
         ("a track is one of", "tracks", {"x": {"keys": [{"is": "WeightKey", "frame": 0.0, "weight": 1.0}]}}),
