@@ -72,7 +72,7 @@ CHANGES: list[tuple[str, Change]] = [
 
 @pytest.mark.parametrize(("says", "change"), CHANGES, ids=[f"{k}-{says}" for k, (says, _) in enumerate(CHANGES)])
 def test_contradictions_are_named(says: str, change: Change) -> None:
-    data = json.loads(dump_document(random_document(2, 60)))
+    data = json.loads(dump_document(random_document(5, 30)))
     data["digest"] = None
     assert parse_document(json.dumps(data).encode()) is not None and len(data["patches"]) >= 4
     change(data)
@@ -92,7 +92,7 @@ def test_contradictions_are_named(says: str, change: Change) -> None:
     ],
 )
 def test_text_that_only_looks_like_a_document_is_refused(old: str, new: str, says: str) -> None:
-    text = json.dumps(json.loads(dump_document(random_document(2, 60))))
+    text = json.dumps(json.loads(dump_document(random_document(5, 30))))
     assert old in text
     with pytest.raises(FileRefused, match=says):
         parse_document(text.replace(old, new, 1).encode())
