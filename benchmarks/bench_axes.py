@@ -86,12 +86,12 @@ def measure(asset: Asset, patch: Painted, axis: SurfacePoints, ball: TriangleMes
         "offset": float(np.linalg.norm(middle - wanted_middle) / patch.radius),
     }
     with Session(discover=False) as session:
-        session.add_surface("hand", asset.mesh)
-        session.add_surface("ball", ball)
-        session.paint("patch", patch.points, surface="hand", axis=axis)
+        session.surfaces.add("hand", asset.mesh)
+        session.surfaces.add("ball", ball)
+        session.patches.paint("patch", patch.points, surface="hand", axis=axis)
         root = Locator.of(ball).closest((ball.points.mean(axis=0) + np.array([0.3, 0.2, 0.1]))[None]).points
-        copy = session.transfer("patch", "ball", root, direction=[0.0, 1.0, 0.0])
-        stretch = session.distortion("patch", copy)
+        copy = session.patches.transfer("patch", "ball", root, direction=[0.0, 1.0, 0.0])
+        stretch = session.geometry.distortion("patch", copy)
     ratio = stretch.length_ratio[np.isfinite(stretch.length_ratio)]
     change = np.maximum(ratio, 1.0 / ratio)
     return {**result, "median": float(np.median(change)), "worst": float(change.max()), "folds": stretch.folds}

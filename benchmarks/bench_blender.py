@@ -86,13 +86,13 @@ def edits() -> dict[str, float]:
     hand = host.add(Asset("hand", rig.surface, rig, meters_per_unit=1.0))
     session = Session(host=host, discover=False)
     mesh = host.read_surface("sheet").mesh
-    session.add_surface("sheet", mesh)
+    session.surfaces.add("sheet", mesh)
     middle = np.argsort(np.linalg.norm(mesh.points - [0.5, 0.5, 0.0], axis=1), kind="stable")[:500]
     patch = SurfacePoints.at_vertices(mesh, middle)
-    session.paint("patch", patch, surface="sheet", axis=patch[[0, 400]])
+    session.patches.paint("patch", patch, surface="sheet", axis=patch[[0, 400]])
     stored = host.stored_document()
     assert stored is not None
-    rotate = milliseconds(lambda: session.rotate("patch", 0.01), 25)
+    rotate = milliseconds(lambda: session.patches.rotate("patch", 0.01), 25)
     undo = milliseconds(session.undo, 15)
     poses = [bent(rig, seed) for seed in range(4)]
     frames = iter(range(1, 1000))

@@ -54,16 +54,16 @@ def edits(mesh: TriangleMesh, note: str) -> dict[str, float]:
     """Rows for one patch of 500 points; answers the least times in seconds."""
     least: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder, Session.open(Path(folder) / "d.json", discover=False) as session:
-        session.add_surface("scan", mesh)
+        session.surfaces.add("scan", mesh)
         points = disk(mesh, 500, 0.05)
-        session.paint("p", points, surface="scan", axis=points[ends(points, mesh)])
-        session.listen(lambda change: session.points("p") and None)
+        session.patches.paint("p", points, surface="scan", axis=points[ends(points, mesh)])
+        session.listen(lambda change: session.geometry.points("p") and None)
         steps = nearby(points, mesh, 60)
         bars = {"translate": 2e-3, "rotate": 2e-3, "bend": 2e-3}
         actions: dict[str, Callable[[int], object]] = {
-            "translate": lambda k: session.translate("p", steps[k]),
-            "rotate": lambda k: session.rotate("p", 0.05),
-            "bend": lambda k: session.bend("p", 3, 0.02),
+            "translate": lambda k: session.patches.translate("p", steps[k]),
+            "rotate": lambda k: session.patches.rotate("p", 0.05),
+            "bend": lambda k: session.patches.bend("p", 3, 0.02),
         }
         for key, action in actions.items():
             least[key] = row(f"{key}, 500 points{note}", action, bars[key])
@@ -71,8 +71,8 @@ def edits(mesh: TriangleMesh, note: str) -> dict[str, float]:
         row(f"redo{note}", lambda k: session.redo(), 1e-4, warm=0)
 
         def transfer(k: int) -> None:
-            copy = session.transfer("p", "scan", steps[k], heading=1j)
-            session.points(copy)
+            copy = session.patches.transfer("p", "scan", steps[k], heading=1j)
+            session.geometry.points(copy)
 
         row(f"transfer, 500 points{note}", transfer, 2e-3)
         session.close(discard=True)
@@ -82,18 +82,18 @@ def edits(mesh: TriangleMesh, note: str) -> dict[str, float]:
 def tree(mesh: TriangleMesh) -> None:
     """A tree of ten patches of 300 points, turned by its root."""
     with tempfile.TemporaryDirectory() as folder, Session.open(Path(folder) / "d.json", discover=False) as session:
-        session.add_surface("scan", mesh)
+        session.surfaces.add("scan", mesh)
         names = [f"p{k}" for k in range(10)]
         for k, name in enumerate(names):
             points = disk(mesh, 300, 0.03, seed=k)
-            session.paint(name, points, surface="scan", axis=points[ends(points, mesh)])
+            session.patches.paint(name, points, surface="scan", axis=points[ends(points, mesh)])
             if k:
-                session.link(name, names[(k - 1) // 2])
+                session.patches.link(name, names[(k - 1) // 2])
 
         def turn(k: int) -> None:
-            session.rotate("p0", 0.05)
+            session.patches.rotate("p0", 0.05)
             for name in names:
-                session.points(name)
+                session.geometry.points(name)
 
         row("rotate a tree of 10 patches of 300 points", turn, 10e-3)
         session.close(discard=True)

@@ -89,14 +89,14 @@ def editing(repeats: int) -> dict[str, str]:
     arm = host.add(Asset("arm", rig.surface, rig, meters_per_unit=1.0))
     session = Session(host=host, discover=False)
     mesh = host.read_surface(key).mesh
-    session.add_surface("sheet", mesh)
+    session.surfaces.add("sheet", mesh)
     middle = np.argsort(np.linalg.norm(mesh.points - [0.5, 0.5, 0.0], axis=1), kind="stable")[:PATCH]
     patch = SurfacePoints.at_vertices(mesh, middle)
     rows = {}
     for count in (1, 30):
         for number in range(len(session.document.patches), count):
-            session.paint(f"patch {number}", patch, surface="sheet", axis=patch[[0, 400]])
-        turn = seconds(lambda: session.rotate("patch 0", 0.01), repeats)
+            session.patches.paint(f"patch {number}", patch, surface="sheet", axis=patch[[0, 400]])
+        turn = seconds(lambda: session.patches.rotate("patch 0", 0.01), repeats)
         rows[f"turn a patch of {PATCH} points, one of {count}"] = spelled(turn, 0.015)
         rows[f"undo of that, one of {count}"] = spelled(seconds(session.undo, repeats - 1))
     frames = iter(range(1000))

@@ -8,22 +8,26 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from contact_core.document.document import ContactDocument, Surface
+from contact_core.document.document import ContactDocument
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.announcer import Announcer, DocumentChanged, Listener
 from contact_core.edit.command import Command
 from contact_core.edit.command_table import BUILT_IN_COMMANDS
+from contact_core.edit.commands import SetExtra
 from contact_core.edit.derived import Derived
+from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.edit.history import History, Step
 from contact_core.edit.open_document import OpenDocument, real_path
 from contact_core.edit.open_macro import OpenMacro
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
 from contact_core.edit.under_way import UnderWay
+from contact_core.edit.verbs import ContactSets, Pairs, Patches
 from contact_core.errors import CommandRejected, FileRefused
-from contact_core.plugins.registry import COMMANDS
-from contact_core.plugins.verbs import PluginVerbs
-from contact_core.proposals.verbs import ProposalVerbs
+from contact_core.plugins.makers import PluginMakers
+from contact_core.plugins.registry import COMMANDS, GEODESIC_ENGINES
+from contact_core.proposals.verbs import ProposingSession
+from contact_core.scene.surfaces import SceneSurfaces
 
 if TYPE_CHECKING:
     from contact_core.document.asset import Asset
@@ -40,19 +44,23 @@ log = logging.getLogger(__name__)
 __all__ = ["DocumentChanged", "Session"]
 
 
-class Session(PluginVerbs, ProposalVerbs):
-    """Edits one document.
+class Session(ProposingSession):
+    """Edits one document: the verbs stand in groups, and each commits one undo step.
+
+    patches: paint, move, bend, link, transfer. pairs: which patches are to touch. surfaces: meshes and rigs behind
+    names. sets: save and load contacts. geometry: where everything is now; it reads and never edits. rigs: by
+    surface. host: the scene, None without.
 
     document: to start from, empty by default. host: the scene in which the document lives; surfaces that the
     document knows are bound to its objects at once, with their meshes and rigs. objects: ids or names of further
     objects that become surfaces, None for all where the document knows none. surfaces: object ids by surface, for
     those that cannot be told. plugins: a manager to share, or modules or objects with hook implementations, of
     highest precedence; discover: whether entry points are read. engine: the geodesic engine, or its name, that
-    measures the coordinates of painted points; the exact one by default. Use `Session.open` for a document file,
-    and `add_surface` for every mesh. Verbs (`paint`, `translate`, `transfer` ...) commit commands; `stroke`
-    gathers a drag into one, `macro` several commands. Use it as a context manager, or call `close`. It is for one
-    thread at a time: while one is in an edit, a stroke or a macro, what another thread commits is refused in
-    words.
+    measures the coordinates of painted points; the exact one by default.
+
+    Use `Session.open` for a document file, and `surfaces.add` for every mesh. `stroke` gathers a drag into one
+    step, `macro` several verbs. Use it as a context manager, or call `close`. It is for one thread at a time: while
+    one is in an edit, a stroke or a macro, what another thread commits is refused in words.
     """
 
     def __init__(
@@ -67,17 +75,23 @@ class Session(PluginVerbs, ProposalVerbs):
         engine: str | GeodesicEngine | None = None,
     ) -> None:
         self.history = History(document or ContactDocument())
-        self.known_meshes = {}
         self.rigs = {}
-        self._derived = Derived(self.known_meshes)
+        self._derived = Derived()
         self._announcer = Announcer()
         self._announcer.listen(self._tell_plugins)
         self._file: OpenDocument | None = None
         self._opening_notes: tuple[str, ...] = ()
         self._under_way = UnderWay()
-        self._equip(plugins, discover=discover)
-        if engine is not None:
-            self._derived.engine = self.named_engine(engine) if isinstance(engine, str) else engine
+        self._plugins: PluginManager | None = None if isinstance(plugins, Iterable) else plugins
+        self._plugin_arguments = (tuple(plugins) if isinstance(plugins, Iterable) else (), discover)
+        self.makers = PluginMakers(lambda: self.plugins)
+        self.geometry = DocumentGeometry(lambda: self.document, self._derived, self.rigs)
+        self.patches, self.pairs, self.sets = Patches(self), Pairs(self), ContactSets(self)
+        self.surfaces = SceneSurfaces(self)
+        if isinstance(engine, str):
+            self._derived.engine = self.plugins.get(GEODESIC_ENGINES, engine)
+        elif engine is not None:
+            self._derived.engine = engine
         self.host = host
         self._binding: Binding | None = None
         self._host_link: HostLink | None = None
@@ -102,27 +116,10 @@ class Session(PluginVerbs, ProposalVerbs):
         if chosen or (objects is None and not document.surfaces):
             document = self.binding.with_objects(document, chosen)
         for name, found in self.binding.surfaces.items():
-            self.known_meshes[found.asset.mesh.digest] = found.asset.mesh
+            self._derived.bring(found.asset.mesh)
             if found.rig is not None:
                 self.rigs[name] = found.rig
         return history if document is history.document else History(document, history.revision)
-
-    def bring(self, surface: Surface, object_id: str | None = None) -> Surface:
-        """Add a surface of another document, bound to the object of this scene that has its triangles.
-
-        object_id: where several have. Raises InvalidInput where there is none.
-        """
-        found = self.binding.find(surface, object_id)
-        self.binding.surfaces[surface.name] = found
-        asset = found.asset
-        return self.add_surface(
-            surface.name,
-            asset.mesh,
-            rig=asset.rig,
-            meters_per_unit=asset.meters_per_unit or 1.0,
-            up_axis=asset.up_axis,
-            world_from_surface=self.host.placement(found.object_id),
-        )
 
     @classmethod
     def of_assets(cls, assets: Mapping[str, Asset], **arguments: Any) -> Session:
@@ -132,7 +129,7 @@ class Session(PluginVerbs, ProposalVerbs):
         surfaces = {name: surface_of(name, asset) for name, asset in assets.items()}
         session = cls(ContactDocument(surfaces=FrozenMap(surfaces)), **arguments)
         for name, asset in assets.items():
-            session.known_meshes[asset.mesh.digest] = asset.mesh
+            session._derived.bring(asset.mesh)
             if asset.rig is not None:
                 session.rigs[name] = asset.rig
         return session
@@ -258,8 +255,18 @@ class Session(PluginVerbs, ProposalVerbs):
         return self._binding
 
     @property
+    def plugins(self) -> PluginManager:
+        """The plugins of this session, found at the first use."""
+        if self._plugins is None:
+            from contact_core.plugins.manager import PluginManager
+
+            given, discover = self._plugin_arguments
+            self._plugins = PluginManager(given, discover=discover)
+        return self._plugins
+
+    @property
     def revision(self) -> int:
-        """Revision of the committed document."""
+        """Revision of the committed document; it grows by one with each command."""
         return self.history.revision
 
     def do(
@@ -269,8 +276,8 @@ class Session(PluginVerbs, ProposalVerbs):
         origin: str = "user",
         merge: bool = False,
         keys: Mapping[float, Mapping[str, Pose]] | None = None,
-    ) -> int:
-        """Commit a command; returns the new revision. It is in the journal when this returns.
+    ) -> None:
+        """Commit a command. It is in the journal when this returns.
 
         merge: where the command before agrees, both become one undo step; not inside a host with undo, whose own
         steps cannot be joined: use a stroke there. keys: by frame, poses by surface that are keyed in the scene, in
@@ -281,7 +288,7 @@ class Session(PluginVerbs, ProposalVerbs):
             self._check_writable()
             if self._under_way.macro is not None:
                 self._under_way.macro.do(command)
-                return self.revision
+                return
             host_keeps_steps = self._host_link is not None and self._host_link.has_undo
             if self._host_link is not None:
                 self._host_link.check_unchanged()
@@ -294,31 +301,32 @@ class Session(PluginVerbs, ProposalVerbs):
                     self._file.did(step)
                 self.history.commit(step)
             self._announcer.tell(DocumentChanged("do", before, step.after, step.revision, step.command, origin))
-            return step.revision
 
-    def submit(self, command: Command, *, origin: str = "user") -> int:
-        """Commit what a verb made."""
-        return self.do(command, origin=origin)
+    def set_extra(self, namespace: str, value: Any) -> None:
+        """Keep JSON data of a host or a plugin in the document."""
+        self.do(SetExtra(namespace, value))
 
-    def undo(self) -> int:
-        """Undo one step; answers the revision. With a host that has undo, it is the host's step that is undone."""
+    def undo(self) -> None:
+        """Undo one step. With a host that has undo, it is the host's step that is undone."""
         if self._host_link is not None and self._host_link.has_undo:
             self._check_idle()
-            return self._host_link.undo()
-        return self._go("undo")
+            self._host_link.undo()
+        else:
+            self._go("undo")
 
-    def redo(self) -> int:
-        """Redo one step; answers the revision."""
+    def redo(self) -> None:
+        """Redo one step, the host's in a host that has undo."""
         if self._host_link is not None and self._host_link.has_undo:
             self._check_idle()
-            return self._host_link.redo()
-        return self._go("redo")
+            self._host_link.redo()
+        else:
+            self._go("redo")
 
-    def goto(self, revision: int, *, origin: str = "user") -> int:
+    def goto(self, revision: int, *, origin: str = "user") -> None:
         """Make the document of a revision current. Raises CommandRejected where the history does not hold it."""
-        return self._go("goto", revision, origin)
+        self._go("goto", revision, origin)
 
-    def _go(self, kind: Literal["undo", "redo", "goto"], revision: int = 0, origin: str = "user") -> int:
+    def _go(self, kind: Literal["undo", "redo", "goto"], revision: int = 0, origin: str = "user") -> None:
         with self._under_way.alone():
             if origin == "host":
                 self._under_way.abandon()
@@ -339,7 +347,6 @@ class Session(PluginVerbs, ProposalVerbs):
             self._announcer.tell(
                 DocumentChanged(kind, before, self.history.document, self.revision, command, origin)
             )
-            return self.revision
 
     def _record_move(self, before: ContactDocument, origin: str) -> None:
         """Tell host and journal where the history went, the host only when it was not the one who asked."""
@@ -388,9 +395,7 @@ class Session(PluginVerbs, ProposalVerbs):
         with self._under_way.alone():
             self._check_writable()
             start = self.document
-            stroke = Stroke(
-                start, self.revision, self._derived, self.rigs, lambda shown: self._preview(start, shown), self
-            )
+            stroke = Stroke(self, lambda shown: self._preview(start, shown))
             self._under_way.stroke = stroke
             try:
                 yield stroke
@@ -435,6 +440,13 @@ class Session(PluginVerbs, ProposalVerbs):
         with self._host_link.recording(label, after, revision):
             self.binding.follow(before, after)
             yield
+
+    def _tell_plugins(self, change: DocumentChanged) -> None:
+        """Plugins hear what is committed, from the first commit on, whether or not they were asked for before."""
+        if change.kind != "preview":
+            self.plugins.notify(
+                "contact_document_changed", document=change.after, revision=change.revision, origin=change.origin
+            )
 
     def _preview(self, start: ContactDocument, shown: ContactDocument) -> None:
         self._announcer.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))

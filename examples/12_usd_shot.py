@@ -9,13 +9,13 @@ main(["usd", "export", "sample:human_hand", "sample:baseball", "--out", "shot.us
 
 with contact.open("shot.usda") as session:
     hand, thing = session.document.surfaces  # every object of the stage is a surface
-    rig, ball = session.rigs[hand], session.mesh(thing)
+    rig, ball = session.rigs[hand], session.geometry.mesh(thing)
     size = np.ptp(ball.points, axis=0).max()
     for side, name in ((-1.0, "thumb_distal"), (1.0, "index_distal")):
         tip = rig.rest_world[rig.joint_index(name), :3, 3]
-        session.brush("disk", name, surface=hand, at=tip, radius=0.05 * size)
+        session.patches.brush("disk", name, surface=hand, at=tip, radius=0.05 * size)
         root = contact.SurfacePoints.at_vertices(ball, [int(np.argmax(side * ball.points[:, 0]))])
-        session.pair(name, session.transfer(name, thing, root, direction=[0.0, 1.0, 0.0]))
+        session.pairs.add(name, session.patches.transfer(name, thing, root, direction=[0.0, 1.0, 0.0]))
     session.accept(session.solve(frames=[1, 12]))  # contacts, pose and keys: one undo step of the stage
     session.save("shot.contact.usda")
 

@@ -7,7 +7,7 @@ was there, and equal patches share it.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import TypeVar, cast
 
@@ -31,12 +31,21 @@ class Derived:
     the coordinates of points on their patches; what is reconstructed here is walked by the exact tracer alone.
     """
 
-    def __init__(self, meshes: Mapping[str, TriangleMesh], engine: GeodesicEngine = EXACT) -> None:
+    def __init__(self, engine: GeodesicEngine = EXACT) -> None:
         self.engine = engine
-        self._meshes = meshes  # by content digest: after a rebind, undo finds the old mesh again
+        self._meshes: dict[str, TriangleMesh] = {}  # by content digest: after a rebind, undo finds the old one
         self._kept: OrderedDict[Hashable, tuple[object, int]] = OrderedDict()
         self._points = 0
         self.computed = 0
+
+    def bring(self, mesh: TriangleMesh) -> None:
+        """Know a mesh from now on, for every surface of every document that has its content."""
+        self._meshes[mesh.digest] = mesh
+
+    def meshes(self, document: ContactDocument) -> dict[str, TriangleMesh]:
+        """The meshes that were brought, by the names of their surfaces in a document."""
+        known = self._meshes
+        return {s.name: known[s.digest] for s in document.surfaces.values() if s.digest in known}
 
     def mesh(self, document: ContactDocument, surface: str) -> TriangleMesh:
         """The mesh of a surface. Raises InvalidInput where the session was not given it."""
@@ -44,7 +53,7 @@ class Derived:
             return self._meshes[document.surface(surface).digest]
         except KeyError:
             raise InvalidInput(
-                f"the mesh of {surface!r} is not loaded: give it to the session by add_surface({surface!r}, mesh)."
+                f"the mesh of {surface!r} is not loaded: give it to the session by surfaces.add({surface!r}, mesh)."
             ) from None
 
     def unit(self, document: ContactDocument, name: str) -> float:

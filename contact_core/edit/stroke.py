@@ -10,44 +10,32 @@ from contact_core.contact.brush import Brush
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, apply_command
 from contact_core.edit.derived import Derived
-from contact_core.edit.verbs.brushing import BrushVerbs
-from contact_core.edit.verbs.gathering import GatheringVerbs
-from contact_core.edit.verbs.organising import OrganisingVerbs
-from contact_core.edit.verbs.placing import PlacingVerbs
-from contact_core.edit.verbs.reshaping import ReshapingVerbs
+from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.edit.editor import Editor, Makers
+from contact_core.edit.verbs import Pairs, Patches, Surfaces
 from contact_core.errors import CommandRejected
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.rig.rig import Rig
 
 
-class Stroke(BrushVerbs, GatheringVerbs, ReshapingVerbs, PlacingVerbs, OrganisingVerbs):
-    """The verbs that change the document, none of which commits: each replaces the preview by what it makes of the
-    starting document. What reads and writes files is not among them. Brushes and axes by name are those of the
-    session; a brush is made once, at its first use in the stroke.
+class Stroke:
+    """An editor whose verbs do not commit: each replaces the preview by what it makes of the starting document.
+    Brushes and axes by name are those of the session; a brush is made once, at its first use in the stroke.
 
     Nothing accumulates, so a drag there and back ends where it began. When the `with` block of
     `Session.stroke` ends, the last command is committed as one step; when it raises, nothing has happened.
     """
 
-    def __init__(
-        self,
-        start: ContactDocument,
-        revision: int,
-        derived: Derived,
-        rigs: dict[str, Rig],
-        preview: Callable[[ContactDocument], None],
-        session: BrushVerbs,
-    ) -> None:
-        self.rigs = rigs
-        self._start = start
-        self._revision = revision
-        self._derived = derived
+    def __init__(self, editor: Editor, preview: Callable[[ContactDocument], None]) -> None:
+        self.rigs = editor.rigs
+        self.makers: Makers = KeptBrushes(editor.makers)
+        self._start = editor.document
+        self._derived = editor.derived
         self._preview = preview
-        self._session = session
-        self._brushes: dict[str, Brush] = {}
         self._command: Command | None = None
-        self._shown = start
+        self._shown = self._start
         self._open = True
+        self.geometry = DocumentGeometry(lambda: self._start, self._derived, self.rigs)
+        self.patches, self.pairs, self.surfaces = Patches(self), Pairs(self), Surfaces(self)
 
     @property
     def document(self) -> ContactDocument:
@@ -64,32 +52,18 @@ class Stroke(BrushVerbs, GatheringVerbs, ReshapingVerbs, PlacingVerbs, Organisin
         """Reconstructed geometry, cached."""
         return self._derived
 
-    def named_brush(self, name: str, **settings: Any) -> Brush:
-        """A brush of the session by name, made at its first use with these settings."""
-        key = repr((name, sorted(settings.items())))
-        if key not in self._brushes:
-            self._brushes[key] = self._session.named_brush(name, **settings)
-        return self._brushes[key]
-
-    def default_axis(
-        self, surface: str, patch: str, points: SurfacePoints, generator: str | AxisGenerator | None
-    ) -> SurfacePoints:
-        """Axis points for a new patch, from an axis generator of the session."""
-        return self._session.default_axis(surface, patch, points, generator)
-
     @property
     def command(self) -> Command | None:
         """What would be committed now."""
         return self._command
 
-    def submit(self, command: Command, *, origin: str = "user") -> int:
+    def do(self, command: Command, *, origin: str = "user") -> None:
         """Preview a command in place of the one before. Raises CommandRejected; then the old preview stays."""
         if not self._open:
             raise CommandRejected("this stroke is over.")
         self._shown = apply_command(command, self._start)
         self._command = command
         self._preview(self._shown)
-        return self._revision
 
     def cancel(self) -> None:
         """Back to the start; nothing will be committed unless another verb comes."""
@@ -101,6 +75,32 @@ class Stroke(BrushVerbs, GatheringVerbs, ReshapingVerbs, PlacingVerbs, Organisin
         self._command, self._shown, self._open = None, self._start, False
 
     def end(self) -> Command | None:
-        """Close the stroke; answers what is to be committed."""
+        """Close the stroke; returns what is to be committed."""
         self._open = False
         return self._command
+
+
+class KeptBrushes(Makers):
+    """Makers whose brushes are made once for each name and settings."""
+
+    def __init__(self, makers: Makers) -> None:
+        self._makers = makers
+        self._brushes: dict[str, Brush] = {}
+
+    def brush(self, name: str, **settings: Any) -> Brush:
+        """A brush by name, made at its first use with these settings."""
+        key = repr((name, sorted(settings.items())))
+        if key not in self._brushes:
+            self._brushes[key] = self._makers.brush(name, **settings)
+        return self._brushes[key]
+
+    def axis(
+        self,
+        geometry: DocumentGeometry,
+        surface: str,
+        patch: str,
+        points: SurfacePoints,
+        generator: str | AxisGenerator | None = None,
+    ) -> SurfacePoints:
+        """Axis points, as the makers behind have them."""
+        return self._makers.axis(geometry, surface, patch, points, generator)

@@ -43,7 +43,7 @@ def _picture(job: Job, pose: Pose, caption: str) -> Picture:
     skin = posed_skin(job.rig, pose)
     thing = moved(job.object.mesh, job.placed)
     points, lines = [], []
-    for pair in job.session.pairs():
+    for pair in job.session.geometry.pairs():
         color = job.session.document.patch(pair.pair.manipulator).color
         here, there = pair.manipulator_points.positions(skin), pair.object_points.positions(thing)
         points += [(here, color), (there, color)]

@@ -95,8 +95,8 @@ def _read(job: Job, plugins: PluginManager) -> None:
         )  # fmt: skip
         job.solids = solids_of(mesh, recipe.object)
         job.placed = world_from_object(recipe.coarse, mesh)
-        job.session.add_surface(HAND, job.manipulator.mesh, meters_per_unit=unit, rig=job.rig)
-        job.session.add_surface(OBJECT, mesh, meters_per_unit=unit, world_from_surface=job.placed)
+        job.session.surfaces.add(HAND, job.manipulator.mesh, meters_per_unit=unit, rig=job.rig)
+        job.session.surfaces.add(OBJECT, mesh, meters_per_unit=unit, world_from_surface=job.placed)
         job.notes += [f"{asset.name}: {note}" for asset in (job.manipulator, raw) for note in asset.notes]
 
 
@@ -106,7 +106,7 @@ def _paint(job: Job, plugins: PluginManager) -> None:
         for spec in job.recipe.patches:
             points = paint(spec, job.manipulator)
             drawn[spec.name] = axis_picks(spec, job.manipulator, points, drawn, plugins)
-            job.session.paint(spec.name, points, surface=HAND, axis=drawn[spec.name])
+            job.session.patches.paint(spec.name, points, surface=HAND, axis=drawn[spec.name])
 
 
 def _place(job: Job, plugins: PluginManager) -> None:
@@ -127,7 +127,7 @@ def _place(job: Job, plugins: PluginManager) -> None:
             reasons = "; ".join(f"{name}: {why}" for name, why in job.placement.left_out.items())
             raise InvalidInput(f"the hand is not near the object, no contact found a place ({reasons}).")
         job.start, job.start_distance = _start(job)
-        session.set_pose(HAND, job.start, title="Start")
+        session.surfaces.set_pose(HAND, job.start, title="Start")
 
 
 def place_from(
@@ -139,8 +139,8 @@ def place_from(
         pose=pose,
         object_mesh=job.object.mesh,
         object_from_rig=np.asarray(np.linalg.inv(job.placed)),
-        patch_points={name: job.session.points(name) for name in names},
-        patch_axes={name: job.session.axis(name).points for name in names},
+        patch_points={name: job.session.geometry.points(name) for name in names},
+        patch_axes={name: job.session.geometry.axis(name).points for name in names},
         solids=job.solids,
     )
     return plugins.make(PLACERS, plugins.name_for(PLACERS, "recipe", placer), **options).place(request)
@@ -152,9 +152,9 @@ def target(name: str) -> str:
 
 
 def _transfer(session: Session, name: str, point: SurfacePoints, **heading: Any) -> None:
-    copy = session.transfer(name, OBJECT, point, name=target(name), **heading)
-    session.recolor(copy, session.document.patch(name).color)
-    session.pair(name, copy, name=name)
+    copy = session.patches.transfer(name, OBJECT, point, name=target(name), **heading)
+    session.patches.recolor(copy, session.document.patch(name).color)
+    session.pairs.add(name, copy, name=name)
 
 
 def _start(job: Job) -> tuple[Pose, float]:
@@ -181,7 +181,7 @@ def _solve(job: Job) -> None:
 def posed_scene(job: Job, pose: Pose) -> PosedScene:
     """What the metrics look at, for one pose."""
     into_object = np.asarray(np.linalg.inv(job.placed))
-    pairs = {geometry.pair.name: geometry for geometry in job.session.pairs()}
+    pairs = {geometry.pair.name: geometry for geometry in job.session.geometry.pairs()}
     return PosedScene(
         rest=job.manipulator.mesh,
         skin=posed_skin(job.rig, pose, job.placed),

@@ -11,7 +11,9 @@ from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.command import Command, Macro, apply_command
 from contact_core.edit.commands import PlaceSurface, Settle
 from contact_core.edit.derived import Derived
-from contact_core.edit.verbs import Verbs
+from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.edit.editor import Makers
+from contact_core.edit.verbs import Pairs, Patches, Surfaces
 from contact_core.rig.rig import Rig
 from contact_core.scene.evaluated_rig import HostRig
 from contact_core.scene.problem import Objective, poses_of, problem_of
@@ -19,7 +21,7 @@ from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution
 
 
-class Draft(Verbs):
+class Draft:
     """An editor of a document of its own. rigs: by surface. evaluated: those whose skin only the host evaluates."""
 
     def __init__(
@@ -28,9 +30,13 @@ class Draft(Verbs):
         derived: Derived,
         rigs: Mapping[str, Rig],
         evaluated: Mapping[str, HostRig] | None = None,
+        makers: Makers | None = None,
     ) -> None:
         self._document, self._derived = document, derived
         self.rigs, self.evaluated = dict(rigs), dict(evaluated or {})
+        self.makers = makers or Makers()
+        self.geometry = DocumentGeometry(lambda: self._document, derived, self.rigs)
+        self.patches, self.pairs, self.surfaces = Patches(self), Pairs(self), Surfaces(self)
 
     @property
     def document(self) -> ContactDocument:
@@ -42,19 +48,18 @@ class Draft(Verbs):
         """Reconstructed geometry, cached."""
         return self._derived
 
-    def submit(self, command: Command, *, origin: str = "user") -> int:
-        """Take a command into the draft; there are no revisions, so it returns 0."""
+    def do(self, command: Command, *, origin: str = "user") -> None:
+        """Take a command into the draft."""
         self._document = apply_command(command, self._document)
-        return 0
 
     def problem(self, objective: Objective | None = None) -> PoseProblem:
         """The pose problem of the document as the draft has it now (`scene.problem.problem_of`)."""
-        return problem_of(self, self.rigs, objective, self.evaluated)
+        return problem_of(self.geometry, self.rigs, objective, self.evaluated)
 
     def take(self, solution: PoseSolution) -> None:
         """Pose the rigs as a solution has them."""
         for name, pose in poses_of(solution, self.rigs).items():
-            self.set_pose(name, pose)
+            self.surfaces.set_pose(name, pose)
 
 
 def change(before: ContactDocument, after: ContactDocument, title: str) -> Command:

@@ -190,8 +190,8 @@ def slide(
     _raise_if_cancelled(slid.solution)
     for contact, root in slid.roots.items():
         name = unmoved.pairs[contact].object
-        if root != draft.root(name):
-            draft.place(name, root.point(), heading=root.heading)
+        if root != draft.geometry.root(name):
+            draft.patches.place(name, root.point(), heading=root.heading)
     draft.take(slid.solution)
     command = change(start, draft.document, "Slide contacts")
     return Proposal(command, draft.document, revision, slid.fixed, slid.solution, left_out)
@@ -241,16 +241,16 @@ def _place_all(draft: Draft, plugins: PluginManager, reach: float, solids: Solid
         request = PlacementRequest(
             rig=draft.rigs[hand],
             pose=draft.document.poses[hand],
-            object_mesh=draft.mesh(thing),
+            object_mesh=draft.geometry.mesh(thing),
             object_from_rig=np.asarray(np.linalg.inv(world[thing]) @ world[hand]),
-            patch_points={name: draft.points(pair.manipulator) for name, pair in pairs.items()},
-            patch_axes={name: draft.axis(pair.manipulator).points for name, pair in pairs.items()},
+            patch_points={name: draft.geometry.points(pair.manipulator) for name, pair in pairs.items()},
+            patch_axes={name: draft.geometry.axis(pair.manipulator).points for name, pair in pairs.items()},
             reach=reach,
             solids=tuple(solids.get(thing, ())),
         )
         result = plugins.get(PLACERS, plugins.name_for(PLACERS, "settle")).place(request)
         for name, place in result.placed.items():
-            draft.place(pairs[name].object, place.root, direction=place.direction)
+            draft.patches.place(pairs[name].object, place.root, direction=place.direction)
         left_out.update(result.left_out)
     return left_out
 
@@ -271,7 +271,7 @@ def _sliding_patches(
             SlidingPatch(
                 contact,
                 document.shapes[patch.shape],
-                draft.root(pair.object),
+                draft.geometry.root(pair.object),
                 slack * problem.manipulator_length / uniform_scale(body.world_from_rig),
                 turn=turn,
                 penalty=penalty,

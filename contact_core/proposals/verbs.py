@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from contact_core.edit.verbs import SurfaceVerbs, Verbs
+from contact_core.document.document import ContactDocument
+from contact_core.edit.derived import Derived
 from contact_core.errors import CommandRejected
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
     from contact_core.proposals.draft import Draft
     from contact_core.proposals.proposal import Proposal, SolveSettings
-    from contact_core.rig.rig import Pose
+    from contact_core.rig.rig import Pose, Rig
     from contact_core.scene.binding import Binding
     from contact_core.scene.problem import Objective
     from contact_core.solve.problem import Limits, PoseProblem
@@ -24,8 +25,20 @@ if TYPE_CHECKING:
     from contact_core.solve.terms import PoseTerm
 
 
-class ProposalVerbs(Verbs, SurfaceVerbs):
-    """Solve, settle, slide, accept, dismiss."""
+class ProposingSession(ABC):
+    """Solve, settle, slide, accept, dismiss. rigs: by surface."""
+
+    rigs: dict[str, Rig]
+
+    @property
+    @abstractmethod
+    def document(self) -> ContactDocument:
+        """The document that proposals start from."""
+
+    @property
+    @abstractmethod
+    def derived(self) -> Derived:
+        """Reconstructed geometry, cached."""
 
     @property
     @abstractmethod
@@ -54,7 +67,7 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
         origin: str = "user",
         merge: bool = False,
         keys: Mapping[float, Mapping[str, Pose]] | None = None,
-    ) -> int:
+    ) -> None:
         """Commit a command and key poses in the scene, as one undo step of document and scene."""
 
     def solve(
@@ -139,14 +152,14 @@ class ProposalVerbs(Verbs, SurfaceVerbs):
         self.show_ghost(found)
         return found
 
-    def accept(self, proposal: Proposal) -> int:
+    def accept(self, proposal: Proposal) -> None:
         """Commit a proposal: contacts and poses of the document, poses and keys of the scene, as one undo step.
 
         Raises CommandRejected when the document has changed since.
         """
         if proposal.revision != self.revision:
             raise CommandRejected("the document has changed since this was proposed: propose again.")
-        return self.do(proposal.command, keys=proposal.keys)
+        self.do(proposal.command, keys=proposal.keys)
 
     def dismiss(self, proposal: Proposal) -> None:
         """Take the ghost away; nothing was committed."""

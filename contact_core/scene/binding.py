@@ -157,7 +157,7 @@ class Binding:
                 self.missing[item.name] = str(error)
                 continue
             name = document.free_name(item.name, document.surfaces)
-            surface = surface_of(name, asset, self._placement(item.id, None))
+            surface = surface_of(name, asset, self.placement(item.id, None))
             document = replace(document, surfaces=document.surfaces.with_item(name, surface))
             self.surfaces[name] = BoundSurface(item.id, asset)
         return self.remembering(document)
@@ -207,7 +207,7 @@ class Binding:
     def _placed(
         self, document: ContactDocument, name: str, found: BoundSurface, frame: float | None
     ) -> ContactDocument:
-        surface, world = document.surface(name), self._placement(found.object_id, frame)
+        surface, world = document.surface(name), self.placement(found.object_id, frame)
         if np.abs(surface.world_from_surface - world).max() <= PLACED_ALIKE:
             return document
         moved = replace(surface, world_from_surface=world)
@@ -224,7 +224,8 @@ class Binding:
             return document
         return replace(document, poses=document.poses.with_item(name, pose))
 
-    def _placement(self, object_id: str, frame: float | None) -> FloatArray:
+    def placement(self, object_id: str, frame: float | None = None) -> FloatArray:
+        """(4, 4) world_from_surface of an object, as `SceneReading.placement` has it."""
         assert self._scene is not None  # an id came out of `objects`
         return self._scene.placement(object_id, frame)
 

@@ -29,7 +29,7 @@ class FollowingSession(Protocol):
     @property
     def revision(self) -> int: ...
 
-    def goto(self, revision: int, *, origin: str = "user") -> int: ...
+    def goto(self, revision: int, *, origin: str = "user") -> None: ...
 
     def adopt(self, history: History) -> None: ...
 
@@ -97,7 +97,7 @@ class HostLink:
         if document_digest(document) != self._digests[stored.revision]:
             raise FileRefused(
                 f"the scene holds contacts of its own, and {origin} holds others: open the scene's with"
-                " Session(host=host), and bring the others in with import_set."
+                " Session(host=host), and bring the others in with sets.read."
             )
         return history
 
@@ -129,19 +129,17 @@ class HostLink:
             yield
         self._digests[revision] = digest
 
-    def undo(self) -> int:
-        """The host's undo; returns the revision then. Raises CommandRejected when the host has nothing to undo."""
+    def undo(self) -> None:
+        """The host's undo. Raises CommandRejected when the host has nothing to undo."""
         if self._undo is None or not self._undo.undo():
             raise CommandRejected("there is nothing to undo in the host.")
         self.follow()
-        return self._session.revision
 
-    def redo(self) -> int:
-        """The host's redo; returns the revision then. Raises CommandRejected when the host has nothing to redo."""
+    def redo(self) -> None:
+        """The host's redo. Raises CommandRejected when the host has nothing to redo."""
         if self._undo is None or not self._undo.redo():
             raise CommandRejected("there is nothing to redo in the host.")
         self.follow()
-        return self._session.revision
 
     def follow(self) -> None:
         """Go to the document that the host holds now."""

@@ -12,7 +12,7 @@ from typing import Literal
 
 from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument
-from contact_core.edit.verbs import Verbs
+from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.rig.rig import Pose, Rig
 from contact_core.scene.evaluated_rig import EvaluatedRig, HostRig
 from contact_core.solve.body import Body, PairedPoints
@@ -39,21 +39,21 @@ class Objective:
 
 
 def problem_of(
-    editor: Verbs,
+    geometry: DocumentGeometry,
     rigs: Mapping[str, Rig],
     objective: Objective | None = None,
     evaluated: Mapping[str, HostRig] | None = None,
     meters_per_unit: float | None = None,
 ) -> PoseProblem:
-    """The pose problem of the editor's document: every rig in its pose, everything else where it stands.
+    """The pose problem of a document: every rig in its pose, everything else where it stands.
 
     The world is the scene in units of `meters_per_unit`, by default those of the first surface of the first pair.
     rigs: by surface, what may be posed. evaluated: by surface, rigs whose skin only the host can evaluate
     (`evaluated_rig`). Raises InvalidInput where the mesh of a surface is not loaded.
     """
     objective, evaluated = objective or Objective(), evaluated or {}
-    document = editor.document
-    pairs = [pair for pair in editor.pairs() if objective.pairs is None or pair.pair.name in objective.pairs]
+    document = geometry.document
+    pairs = [pair for pair in geometry.pairs() if objective.pairs is None or pair.pair.name in objective.pairs]
     names = dict.fromkeys(name for pair in pairs for name in (pair.manipulator_surface, pair.object_surface))
     names.update(dict.fromkeys(objective.bodies))
     unit = meters_per_unit or (document.surface(next(iter(names))).meters_per_unit if names else 1.0)
@@ -65,7 +65,7 @@ def problem_of(
             return evaluated[name].body(name, pose, world)
         if name in rigs:
             return Body.skinned(rigs[name], name=name, pose=pose or Pose.rest(rigs[name]), world_from_rig=world)
-        return Body.rigid(name, editor.mesh(name), world_from_surface=world)
+        return Body.rigid(name, geometry.mesh(name), world_from_surface=world)
 
     contacts = tuple(
         PairedPoints(

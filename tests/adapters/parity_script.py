@@ -82,18 +82,18 @@ def run(host: Any, joint: str, path: Path) -> Outcome:
     ball = _add(session, "ball", thing, place)
 
     patch, axis = _patch(rig, hand, joint)
-    session.paint("tip", patch, surface="hand", axis=axis)
-    start = session.reconstruction("tip").points.positions(hand)[0]
+    session.patches.paint("tip", patch, surface="hand", axis=axis)
+    start = session.geometry.reconstruction("tip").points.positions(hand)[0]
     to_ball = np.linalg.inv(place) @ host.placement(ids["hand"])
     nearest = Locator(ball).closest((start @ to_ball[:3, :3].T + to_ball[:3, 3])[None]).points
-    copy = session.transfer("tip", "ball", nearest, heading=1.0 + 0.0j)
-    session.rotate(copy, 0.4)
-    session.rotate(copy, 3.0)  # a slip, taken back by the host's own undo
+    copy = session.patches.transfer("tip", "ball", nearest, heading=1.0 + 0.0j)
+    session.patches.rotate(copy, 0.4)
+    session.patches.rotate(copy, 3.0)  # a slip, taken back by the host's own undo
     assert host.undo()
-    session.pair("tip", copy)
+    session.pairs.add("tip", copy)
     solution = _solve(session, rig, ball, place)
     with host.step("Solve and key"):
-        session.set_pose("hand", solution)
+        session.surfaces.set_pose("hand", solution)
         host.write_pose(ids["hand"], solution, FRAME)
     after = session.revision
     session.undo()
@@ -103,7 +103,7 @@ def run(host: Any, joint: str, path: Path) -> Outcome:
 
     host.save(path)
     session.close()
-    (pair,) = session.pairs()
+    (pair,) = session.geometry.pairs()
     target = pair.object_points.positions(ball) @ place[:3, :3].T + place[:3, 3]
     return _outcome(type(host)(path), ids, rig, session, pair.manipulator_points, target)
 
@@ -154,7 +154,7 @@ LIMITS = {
 def _add(session: Session, name: str, asset: Asset, place: FloatArray) -> TriangleMesh:
     """The surface in single precision, in the session; nothing to undo in the host but the document."""
     mesh = TriangleMesh(asset.mesh.points.astype(np.float32), asset.mesh.faces)
-    session.add_surface(name, mesh, rig=asset.rig, world_from_surface=np.round(place, 5))
+    session.surfaces.add(name, mesh, rig=asset.rig, world_from_surface=np.round(place, 5))
     return mesh
 
 
@@ -176,7 +176,7 @@ def _patch(rig: Rig, surface: TriangleMesh, joint: str) -> tuple[SurfacePoints, 
 
 
 def _solve(session: Session, rig: Rig, ball: TriangleMesh, place: FloatArray) -> Pose:
-    (pair,) = session.pairs()
+    (pair,) = session.geometry.pairs()
     problem = PoseProblem(
         bodies=(Body.skinned(rig, name="hand"), Body.rigid("ball", ball, world_from_surface=place)),
         contacts=(PairedPoints("tip", "hand", pair.manipulator_points, "ball", pair.object_points, pair.weights),),

@@ -41,10 +41,10 @@ def scene() -> contact.MemoryHost:
 
 def paint(session: contact.Session) -> None:
     """A patch round the tip of the arm, its copy on the ball, paired."""
-    arm, thing = session.mesh(ARM), session.mesh(BALL)
+    arm, thing = session.geometry.mesh(ARM), session.geometry.mesh(BALL)
     tip = int(np.argmax(arm.points[:, 1] + arm.points[:, 0]))
     near = np.argsort(np.linalg.norm(arm.points - arm.points[tip], axis=1))[:6]
-    session.paint(
+    session.patches.paint(
         "tip",
         contact.SurfacePoints.at_vertices(arm, near),
         surface=ARM,
@@ -52,8 +52,8 @@ def paint(session: contact.Session) -> None:
         heading=1.0,
     )
     side = int(np.argmin(thing.points[:, 0]))
-    copy = session.transfer("tip", BALL, contact.SurfacePoints.at_vertices(thing, [side]), heading=1.0)
-    session.pair("tip", copy, name="touch")
+    copy = session.patches.transfer("tip", BALL, contact.SurfacePoints.at_vertices(thing, [side]), heading=1.0)
+    session.pairs.add("tip", copy, name="touch")
 
 
 def gap(session: contact.Session, pose: contact.Pose) -> float:
@@ -63,9 +63,9 @@ def gap(session: contact.Session, pose: contact.Pose) -> float:
     for joint, matrix in zip(pose.joints, pose.local, strict=True):
         local[rig.joint_index(joint)] = matrix
     posed = rig.surface.with_points(skin(rig, forward_kinematics(rig.parents, local)))
-    (pair,) = session.pairs()
+    (pair,) = session.geometry.pairs()
     world = session.document.surface(BALL).world_from_surface
-    there = pair.object_points.positions(session.mesh(BALL)) @ world[:3, :3].T + world[:3, 3]
+    there = pair.object_points.positions(session.geometry.mesh(BALL)) @ world[:3, :3].T + world[:3, 3]
     return float(np.linalg.norm(pair.manipulator_points.positions(posed) - there, axis=1).mean())
 
 
@@ -166,7 +166,7 @@ def test_a_scene_opened_again_knows_its_surfaces(tmp_path: Path) -> None:
         session.accept(session.solve())
         session.save()
     with contact.open(path) as again:
-        assert set(again.meshes) == {ARM, BALL} and ARM in again.rigs
+        assert set(again.surfaces.meshes) == {ARM, BALL} and ARM in again.rigs
         assert list(again.document.pairs) == ["touch"]
         again.accept(again.solve())  # goes on where it was
 
@@ -190,3 +190,27 @@ def test_held_joints_stay_and_a_pair_can_be_left_out() -> None:
             session.solve(pairs=["tuch"])
         with pytest.raises(contact.InvalidInput, match="pair"):
             contact.new(**assets(), discover=False).solve()
+
+
+def test_a_session_is_small_and_its_verbs_stand_in_groups() -> None:
+    with contact.Session(discover=False) as session:
+        public = {name for name in dir(session) if not name.startswith("_")}
+    assert len(public) <= 45, sorted(public)
+    assert {"patches", "pairs", "surfaces", "sets", "geometry"} <= public
+
+
+def test_a_renamed_surface_keeps_its_object_and_its_rig_through_undo_and_reopening() -> None:
+    host = scene()
+    with contact.Session(host=host, objects=None) as session:
+        paint(session)
+        object_id = session.binding.surfaces[ARM].object_id
+        session.surfaces.rename(ARM, "limb")
+        assert session.document.patch("tip").surface == "limb" and session.rigs["limb"] is session.rigs[ARM]
+        session.accept(session.solve())
+        assert not same_pose(session.rigs["limb"], host.read_pose(object_id), None)
+        session.undo()
+        session.undo()
+        assert ARM in session.document.surfaces and session.solve().poses
+        session.redo()
+    with contact.Session(host=host) as again:
+        assert again.binding.surfaces["limb"].object_id == object_id and not again.notes

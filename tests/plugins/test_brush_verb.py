@@ -21,33 +21,33 @@ from contact_core.testing import meshes
 def session() -> Session:
     """A ball of radius 1, and the patch "pad" as a stroke over its top, all with the built-in brushes."""
     session = Session()
-    session.add_surface("ball", meshes.icosphere(3))
-    session.brush("disk", "pad", over(session, (-0.4, 0.0, 0.9), (0.4, 0.0, 0.9)), surface="ball")
+    session.surfaces.add("ball", meshes.icosphere(3))
+    session.patches.brush("disk", "pad", over(session, (-0.4, 0.0, 0.9), (0.4, 0.0, 0.9)), surface="ball")
     return session
 
 
 def over(session: Session, *places: tuple[float, float, float], radius: float = 0.25) -> BrushGesture:
     """A stroke over the ball along places in space."""
-    mesh = session.mesh("ball")
+    mesh = session.geometry.mesh("ball")
     path = Locator.of(mesh).closest(np.array(places)).points
     return BrushGesture(mesh, path, radius=radius, spacing=0.06, seed=1)
 
 
 def distance(session: Session, points: SurfacePoints, path: SurfacePoints) -> FloatArray:
     """(n,) over the ball, of points from the nearest point of a path."""
-    return log_map(session.mesh("ball"), path, points).distance
+    return log_map(session.geometry.mesh("ball"), path, points).distance
 
 
 def test_several_marks_are_one_step_and_only_the_brush_knows_them(session: Session) -> None:
     """The patch holds what the marks hold together; undone and redone it is the same, and no brush is written."""
     gestures = [over(session, (0.0, 1.0, 0.0)), over(session, (0.0, -1.0, 0.0))]
-    brush, before, revision = session.named_brush("disk"), session.document, session.revision
+    brush, before, revision = session.makers.brush("disk"), session.document, session.revision
     wanted = SurfacePoints.concatenate([brush.mark(gesture).points for gesture in gestures])
     with pytest.raises(InvalidInput, match="surface"):
-        session.brush("disk", "sides", *gestures)
-    session.brush("disk", "sides", *gestures, surface="ball", generator="principal")
+        session.patches.brush("disk", "sides", *gestures)
+    session.patches.brush("disk", "sides", *gestures, surface="ball", generator="principal")
     assert session.revision == revision + 1
-    mesh, sides = session.mesh("ball"), session.points("sides")
+    mesh, sides = session.geometry.mesh("ball"), session.geometry.points("sides")
     np.testing.assert_allclose(sides.positions(mesh), wanted.positions(mesh), atol=1e-9)
     text = dump_document(session.document)
     assert b"disk" not in text
@@ -58,23 +58,23 @@ def test_several_marks_are_one_step_and_only_the_brush_knows_them(session: Sessi
 
 
 def test_more_of_a_patch_is_one_step(session: Session) -> None:
-    before, revision = session.points("pad"), session.revision
+    before, revision = session.geometry.points("pad"), session.revision
     gesture = over(session, (0.0, 1.0, 0.0))
-    mark = session.named_brush("disk").mark(gesture)
-    session.brush("disk", "pad", gesture)
+    mark = session.makers.brush("disk").mark(gesture)
+    session.patches.brush("disk", "pad", gesture)
     assert session.revision == revision + 1
-    assert len(session.points("pad")) == len(before) + len(mark.points)
+    assert len(session.geometry.points("pad")) == len(before) + len(mark.points)
 
 
 def test_the_eraser_takes_what_lies_under_its_strokes_and_nothing_else(session: Session) -> None:
     """Over two strokes: within the radius nothing stays, beyond radius and one gap everything does, in one step."""
     ends = [over(session, (-0.4, 0.0, 0.9), radius=0.2), over(session, (0.4, 0.0, 0.9), radius=0.2)]
-    before, revision = session.points("pad"), session.revision
+    before, revision = session.geometry.points("pad"), session.revision
     document = session.document
-    session.brush("eraser", "pad", *ends)
+    session.patches.brush("eraser", "pad", *ends)
     assert session.revision == revision + 1
     paths = SurfacePoints.concatenate([gesture.path for gesture in ends])
-    was, stays = distance(session, before, paths), distance(session, session.points("pad"), paths)
+    was, stays = distance(session, before, paths), distance(session, session.geometry.points("pad"), paths)
     assert (was <= 0.2).sum() > 20 and (stays > 0.2).all()
     assert (was > 0.32).sum() > 10 and (stays > 0.32).sum() == (was > 0.32).sum()
     session.undo()
@@ -85,14 +85,14 @@ def test_what_cannot_be_brushed_is_said_and_changes_nothing(session: Session) ->
     document = session.document
     far = over(session, (0.0, 0.0, -1.0))
     with pytest.raises(CommandRejected, match="lies under"):
-        session.brush("eraser", "pad", far)
+        session.patches.brush("eraser", "pad", far)
     with pytest.raises(InvalidInput, match="no brush 'disc'; there are: disk"):
-        session.brush("disc", "pad", far)
+        session.patches.brush("disc", "pad", far)
     with pytest.raises(InvalidInput, match="gesture"):
-        session.brush("disk", "pad")
+        session.patches.brush("disk", "pad")
     other = BrushGesture(meshes.icosphere(2), far.path, radius=0.2)
     with pytest.raises(InvalidInput, match="another mesh"):
-        session.brush("disk", "pad", other)
+        session.patches.brush("disk", "pad", other)
     assert session.document is document
 
 
@@ -114,19 +114,19 @@ class Plugin:
 def test_a_drag_with_a_brush_of_a_plugin_previews_and_commits_once() -> None:
     """Each gesture of a drag replaces the one before; strength halves the weight that the area gives."""
     with Session(plugins=[Plugin()], discover=False) as session:
-        session.add_surface("ball", meshes.icosphere(3))
+        session.surfaces.add("ball", meshes.icosphere(3))
         path = over(session, (-0.3, 0.0, 0.9), (0.0, 0.0, 1.0), (0.3, 0.1, 0.9))
-        revision, dot = session.revision, session.named_brush("dot")
+        revision, dot = session.revision, session.makers.brush("dot")
         with session.stroke() as drag:
             with pytest.raises(InvalidInput, match="no brush 'dash'"):
-                drag.brush("dash", "dots", path, surface="ball", axis=path.path)
+                drag.patches.brush("dash", "dots", path, surface="ball", axis=path.path)
             assert not hasattr(drag, "export_set") and not hasattr(drag, "import_set")  # no files in a drag
             for radius in (0.1, 0.2):
-                drag.brush(dot, "dots", over(session, (0.0, 0.0, radius)), surface="ball", axis=path.path)
-            drag.brush("dot", "dots", path, surface="ball", axis=path.path)
-            assert drag.named_brush("dot") is drag.named_brush("dot")
-        assert session.revision == revision + 1 and len(session.points("dots")) == 3
-        session.paint("whole", path.path, surface="ball", axis=path.path)
+                drag.patches.brush(dot, "dots", over(session, (0.0, 0.0, radius)), surface="ball", axis=path.path)
+            drag.patches.brush("dot", "dots", path, surface="ball", axis=path.path)
+            assert drag.makers.brush("dot") is drag.makers.brush("dot")
+        assert session.revision == revision + 1 and len(session.geometry.points("dots")) == 3
+        session.patches.paint("whole", path.path, surface="ball", axis=path.path)
         half, whole = (session.document.shape_of(name).weights for name in ("dots", "whole"))
         np.testing.assert_allclose(half, 0.5 * whole)
 
@@ -134,9 +134,9 @@ def test_a_drag_with_a_brush_of_a_plugin_previews_and_commits_once() -> None:
 def test_a_new_patch_in_a_drag_gets_the_axis_that_it_gets_without(session: Session) -> None:
     """By the name of the brush and that of an axis generator; the committed document is the same."""
     gesture = over(session, (0.0, 1.0, 0.0), (0.3, 0.9, 0.0))
-    session.brush("disk", "side", gesture, surface="ball", generator="principal")
+    session.patches.brush("disk", "side", gesture, surface="ball", generator="principal")
     directly = dump_document(session.document)
     session.undo()
     with session.stroke() as drag:
-        drag.brush("disk", "side", gesture, surface="ball", generator="principal")
+        drag.patches.brush("disk", "side", gesture, surface="ball", generator="principal")
     assert dump_document(session.document) == directly

@@ -47,8 +47,8 @@ def request() -> PlacementRequest:
         pose=Pose.rest(done.rig),
         object_mesh=done.object.mesh,
         object_from_rig=np.asarray(np.linalg.inv(done.placed)),
-        patch_points={name: done.session.points(name) for name in names},
-        patch_axes={name: done.session.axis(name).points for name in names},
+        patch_points={name: done.session.geometry.points(name) for name in names},
+        patch_axes={name: done.session.geometry.axis(name).points for name in names},
         solids=done.solids,
     )
 

@@ -42,17 +42,17 @@ def session() -> Session:
     """A hand and a ball in other units, three pairs, the targets near one another but placed badly."""
     rig = rigs.hand_like(rigs.limited_freedom)
     session = Session(plugins=[contact_builtins], discover=False)
-    session.add_surface("hand", rig.surface, rig=rig, meters_per_unit=0.01)
+    session.surfaces.add("hand", rig.surface, rig=rig, meters_per_unit=0.01)
     where = np.eye(4)
     where[:3, 3] = [0.05, 0.02, 0.06]
     ball = BALL.with_points(0.01 * BALL.points)
-    session.add_surface("ball", ball, world_from_surface=where)
+    session.surfaces.add("ball", ball, world_from_surface=where)
     for name, place in zip(PATCHES, ([0, -1, 0], [-0.8, 0.6, 0.2], [0.9, 0.5, 0.1]), strict=True):
         points = pad(rig, name)
-        session.paint(name, points, surface="hand", axis=points[[0, 11]])
+        session.patches.paint(name, points, surface="hand", axis=points[[0, 11]])
         at = Locator.of(ball).closest(np.array([place], float)).points
-        session.transfer(name, "ball", at, direction=[0.3, 0.2, 1.0], name=f"{name} there")
-        session.pair(name, f"{name} there", name=name)
+        session.patches.transfer(name, "ball", at, direction=[0.3, 0.2, 1.0], name=f"{name} there")
+        session.pairs.add(name, f"{name} there", name=name)
     return session
 
 
@@ -90,20 +90,20 @@ def spread_out() -> Session:
     """A hand on a table in other units; three fingertips are to touch it up to 2 cm from where they can."""
     rig = rigs.hand_like(rigs.narrow_freedom)
     session = Session(plugins=[contact_builtins], discover=False)
-    session.add_surface("hand", rig.surface, rig=rig, meters_per_unit=0.01)
+    session.surfaces.add("hand", rig.surface, rig=rig, meters_per_unit=0.01)
     floor = meshes.plane(12, 0.3)
     where = np.eye(4)
     where[:3, :3] = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]  # the table's normal is -y
     where[:3, 3] = [0.0, 0.02, -0.15]
-    session.add_surface("table", floor, world_from_surface=where)
+    session.surfaces.add("table", floor, world_from_surface=where)
     for name, wrong in (("finger1_2", 0.01), ("finger2_2", -0.01), ("finger3_2", 0.008)):
         points = pad(rig, name, axis=1)
-        session.paint(name, points, surface="hand", axis=points[[0, 11]])
+        session.patches.paint(name, points, surface="hand", axis=points[[0, 11]])
         x, _, z = 0.01 * points[[0]].positions(rig.surface)[0]
         at = Locator.of(floor).closest(np.array([[x + wrong, z + 0.15, 0.0]])).points
         way = points[[11]].positions(rig.surface)[0] - points[[0]].positions(rig.surface)[0]
-        session.transfer(name, "table", at, direction=[way[0], way[2], 0.0], name=f"{name} there")
-        session.pair(name, f"{name} there", name=name)
+        session.patches.transfer(name, "table", at, direction=[way[0], way[2], 0.0], name=f"{name} there")
+        session.pairs.add(name, f"{name} there", name=name)
     return session
 
 
@@ -126,8 +126,11 @@ def test_the_hand_on_the_mug_fits_better_by_a_third(repository: Path) -> None:
     job = prepare(recipe, PluginManager([contact_builtins], discover=False))
     session = Session(job.session.document, plugins=[contact_builtins], discover=False)
     for name, surface in job.session.document.surfaces.items():
-        session.add_surface(
-            name, job.session.mesh(name), rig=job.session.rigs.get(name), meters_per_unit=surface.meters_per_unit
+        session.surfaces.add(
+            name,
+            job.session.geometry.mesh(name),
+            rig=job.session.rigs.get(name),
+            meters_per_unit=surface.meters_per_unit,
         )
     for kind in ("settle", "slide"):
         proposal = propose(session, kind)
@@ -138,20 +141,20 @@ def test_the_hand_on_the_mug_fits_better_by_a_third(repository: Path) -> None:
 def test_slack_holds_in_the_units_of_the_object(session: Session) -> None:
     proposal = session.slide(slack=0.02)
     length = proposal.before.problem.manipulator_length  # units of the hand, cm
-    ball, moved = session.mesh("ball"), []
+    ball, moved = session.geometry.mesh("ball"), []
     for name, placement in proposal.command.placements:
         assert not isinstance(placement, Link)
-        at = placement.point().positions(ball) - session.root(name).point().positions(ball)
+        at = placement.point().positions(ball) - session.geometry.root(name).point().positions(ball)
         moved.append(100.0 * float(np.linalg.norm(at)) / length)
     assert 0.01 < max(moved) <= 0.02 * np.sqrt(2.0) + 1e-6
 
 
 def test_a_linked_contact_stays_linked(session: Session) -> None:
-    session.link("finger1_2 there", "wrist there")
+    session.patches.link("finger1_2 there", "wrist there")
     proposal = session.slide()
     assert isinstance(proposal.ghost.patch("finger1_2 there").placement, Link)
     session.accept(proposal)
-    points = session.points("finger1_2 there").positions(session.mesh("ball"))
+    points = session.geometry.points("finger1_2 there").positions(session.geometry.mesh("ball"))
     after = proposal.after.problem
     found = after.state(proposal.after.theta).vectors(after.pairs.object_points)[after.pairs.rows["finger1_2"]]
     centimetres = 100.0 * (points + np.array([0.05, 0.02, 0.06]))  # the world is in units of the hand
@@ -160,7 +163,7 @@ def test_a_linked_contact_stays_linked(session: Session) -> None:
 
 def test_a_proposal_for_an_older_document_is_refused(session: Session) -> None:
     proposal = session.settle(rounds=1)
-    session.rotate("wrist there", 0.1)
+    session.patches.rotate("wrist there", 0.1)
     with pytest.raises(CommandRejected, match="changed since"):
         session.accept(proposal)
 
@@ -180,8 +183,10 @@ def test_refusals(session: Session) -> None:
 
 def test_what_cannot_move_says_why(session: Session) -> None:
     """A pair between two fingers stays: a contact does not slide on what bends."""
-    session.transfer("finger1_2", "hand", session.root("finger3_2").point(), direction=[0, 1, 0], name="on finger")
-    session.pair("finger1_2", "on finger", name="fingers")
+    session.patches.transfer(
+        "finger1_2", "hand", session.geometry.root("finger3_2").point(), direction=[0, 1, 0], name="on finger"
+    )
+    session.pairs.add("finger1_2", "on finger", name="fingers")
     for kind in ("settle", "slide"):
         proposal = propose(session, kind)
         assert "bends" in proposal.left_out["fingers"]

@@ -131,9 +131,9 @@ def test_parts_are_one_step_of_a_session() -> None:
     mesh = meshes.torus()
     parts = gestures_along(across(mesh, 3, 0.12), 0.03)
     with Session() as session:
-        session.add_surface("ring", mesh)
+        session.surfaces.add("ring", mesh)
         revision = session.revision
-        session.brush("disk", "pad", *parts, surface="ring", generator="principal")
+        session.patches.brush("disk", "pad", *parts, surface="ring", generator="principal")
         assert session.revision == revision + 1
 
 

@@ -21,16 +21,18 @@ from contact_core.testing.solver_contract import small
 @pytest.fixture
 def session() -> Iterator[Session]:
     with Session(plugins=[contact_builtins], discover=False) as made:
-        made.add_surface("sheet", gesture("saddle").mesh)
+        made.surfaces.add("sheet", gesture("saddle").mesh)
         yield made
 
 
 def test_a_brush_takes_its_settings_by_keyword(session: Session) -> None:
     stroke = gesture("saddle")
     axis = stroke.path[[0, 6]]
-    session.brush("disk", "even", stroke, surface="sheet", axis=axis)
-    session.brush("disk", "fading", stroke, surface="sheet", axis=axis, falloff="smooth")
-    session.brush(session.named_brush("disk"), "again", stroke, surface="sheet", axis=axis, falloff="smooth")
+    session.patches.brush("disk", "even", stroke, surface="sheet", axis=axis)
+    session.patches.brush("disk", "fading", stroke, surface="sheet", axis=axis, falloff="smooth")
+    session.patches.brush(
+        session.makers.brush("disk"), "again", stroke, surface="sheet", axis=axis, falloff="smooth"
+    )
     shapes, patches = session.document.shapes, session.document.patches
     even, fading, again = (shapes[patches[name].shape].weights for name in ("even", "fading", "again"))
     assert np.ptp(fading / even) > 0.5
@@ -41,15 +43,15 @@ def test_a_brush_takes_its_settings_by_keyword(session: Session) -> None:
         ({"fallof": "none"}, "did you mean 'falloff'"),
     ):
         with pytest.raises(InvalidInput, match=says):
-            session.brush("disk", "even", stroke, **wrong)
+            session.patches.brush("disk", "even", stroke, **wrong)
     assert session.document is before
 
 
 def test_an_axis_generator_may_be_made_with_settings(session: Session) -> None:
     stroke = gesture("saddle")
     made = session.plugins.make(AXIS_GENERATORS, "guided", elongated=100.0)
-    session.paint("named", stroke.path, surface="sheet", generator="guided")
-    session.paint("made", stroke.path, surface="sheet", generator=made)
+    session.patches.paint("named", stroke.path, surface="sheet", generator="guided")
+    session.patches.paint("made", stroke.path, surface="sheet", generator=made)
     assert {"named", "made"} <= set(session.document.patches)
     with pytest.raises(InvalidInput, match="elongated is at least 1"):
         session.plugins.make(AXIS_GENERATORS, "guided", elongated=0.5)

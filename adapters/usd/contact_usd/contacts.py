@@ -139,8 +139,8 @@ def _hide_those_below(stage: Usd.Stage, layer: Sdf.Layer) -> None:
 def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, surface_path: Sdf.Path) -> None:
     patch = session.document.patches[name]
     surface = session.document.surfaces[patch.surface]
-    mesh = session.posed_mesh(patch.surface)  # what the animator sees; the triangles are those of the rest pose
-    points = session.reconstruction(name).points
+    mesh = session.geometry.posed_mesh(patch.surface)  # what the animator sees; its triangles are those at rest
+    points = session.geometry.reconstruction(name).points
     positions = _placed(points.positions(mesh), surface.world_from_surface)
     drawn = UsdGeom.Points.Define(stage, path)
     prim = drawn.GetPrim()
@@ -153,7 +153,7 @@ def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, 
     role = "original" if patch.original else "transferred"
     prim.CreateAttribute("contact:role", _TYPES.Token, False, Sdf.VariabilityUniform).Set(role)
     prim.CreateRelationship("contact:surface", False).SetTargets([surface_path])
-    axis = session.axis(name).points
+    axis = session.geometry.axis(name).points
     targets = []
     if len(axis) > 1:
         curve_path = path.GetParentPath().AppendChild(f"{path.name}_axis")

@@ -77,13 +77,13 @@ def transfer(
     Surfaces must have the triangles that the contacts were painted on. Raises ContactError.
     """
     with Session(document, discover=False) as source:
-        loaded = source.contact_set("contacts", list(document.patches))
+        loaded = source.sets.of("contacts", list(document.patches))
     with open_shot(path, wanted) as shot:
         with shot.host.step("Transfer contacts"):
             for surface in loaded.surfaces.values():
                 if surface.name not in shot.document.surfaces:
-                    shot.bring(surface, wanted.get(surface.name))
-            names = shot.import_set(loaded)
+                    shot.surfaces.bring(surface, wanted.get(surface.name))
+            names = shot.sets.read(loaded)
             publish(shot)
         shot.host.save(out)
         return {"patches": list(names.values()), "surfaces": prims_of(shot)}

@@ -1,17 +1,17 @@
-"""The artist's verbs: each finds out, with the meshes, what a command has to hold, and submits that command."""
+"""The artist's verbs, in groups: each finds out, on the geometry, what a command has to hold, and has it done."""
 
 from contact_core.edit.verbs.brushing import BrushVerbs
-from contact_core.edit.verbs.editor import Editor
 from contact_core.edit.verbs.gathering import GatheringVerbs
 from contact_core.edit.verbs.organising import OrganisingVerbs
+from contact_core.edit.verbs.pairs import Pairs
 from contact_core.edit.verbs.placing import PlacingVerbs
 from contact_core.edit.verbs.reshaping import ReshapingVerbs
-from contact_core.edit.verbs.sets import SetVerbs
-from contact_core.edit.verbs.surfaces import SurfaceVerbs
+from contact_core.edit.verbs.sets import ContactSets
+from contact_core.edit.verbs.surfaces import Surfaces
 
 
-class Verbs(BrushVerbs, GatheringVerbs, ReshapingVerbs, PlacingVerbs, OrganisingVerbs, SetVerbs):
-    """All verbs. A session commits what they submit, a stroke previews it."""
+class Patches(BrushVerbs, GatheringVerbs, ReshapingVerbs, PlacingVerbs, OrganisingVerbs):
+    """Everything that is done to patches."""
 
 
-__all__ = ["Editor", "SurfaceVerbs", "Verbs"]
+__all__ = ["ContactSets", "Pairs", "Patches", "Surfaces"]

@@ -21,12 +21,6 @@ from contact_core.settings import configured
 class BrushVerbs(PaintingVerbs):
     """Paint and erase with brushes."""
 
-    def named_brush(self, name: str, **settings: Any) -> Brush:
-        """A brush by name, with its settings; a session asks its plugins."""
-        raise InvalidInput(
-            f"only a session knows brushes by name: ask its named_brush({name!r}) before, and pass what it answers."
-        )
-
     def brush(
         self,
         brush: str | Brush,
@@ -40,7 +34,7 @@ class BrushVerbs(PaintingVerbs):
         generator: str | AxisGenerator | None = None,
         color: Color | None = None,
         **settings: Any,
-    ) -> int:
+    ) -> None:
         """Paint a patch with a brush, or erase from it where the brush erases; all gestures are one step.
 
         brush: a name, or the brush itself. surface, axis, generator, color: of a new patch, as for `paint`. Erased
@@ -50,38 +44,37 @@ class BrushVerbs(PaintingVerbs):
         the brush. settings: the brush's own, such as falloff="smooth".
         """
         if isinstance(brush, str):
-            tool = self.named_brush(brush, **settings)
+            tool = self._editor.makers.brush(brush, **settings)
         else:
             tool = configured(brush, settings, f"the brush {brush.name!r}")
-        where = self.document.patches[patch].surface if patch in self.document.patches else surface
+        where = self._document.patches[patch].surface if patch in self._document.patches else surface
         if where is None:
             raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")
         if at is not None:
             gestures += (self._gesture(where, at, radius, spacing),)
         if not gestures:
             raise InvalidInput(f"the brush {tool.name!r} needs a gesture or several, but none came.")
-        mesh = self.mesh(where)
+        mesh = self._geometry.mesh(where)
         if any(gesture.mesh.digest != mesh.digest for gesture in gestures):
             raise InvalidInput(f"a gesture for {patch!r} was made over another mesh than that of {where!r}.")
         marks = [tool.mark(gesture) for gesture in gestures]
         if tool.erases:
-            here = self.points(patch)
+            here = self._geometry.points(patch)
             under = [_covered(here, mark, gesture) for mark, gesture in zip(marks, gestures, strict=True)]
             indices = np.flatnonzero(np.any(under, axis=0))
             if not len(indices):
                 raise CommandRejected(f"no point of {patch!r} lies under the brush {tool.name!r}.")
-            return self.erase(patch, indices)
+            self.erase(patch, indices)
+            return
         points = SurfacePoints.concatenate([mark.points for mark in marks])
         strength = np.concatenate([mark.strength for mark in marks])  # (n,)
-        return self.paint(
-            patch, points, surface=where, axis=axis, generator=generator, strength=strength, color=color
-        )
+        self.paint(patch, points, surface=where, axis=axis, generator=generator, strength=strength, color=color)
 
     def _gesture(self, surface: str, at: Any, radius: float, spacing: float) -> BrushGesture:
-        mesh = self.mesh(surface)
+        mesh = self._geometry.mesh(surface)
         if not isinstance(at, SurfacePoints):
             at = Locator.of(mesh).closest(np.asarray(at, float).reshape(-1, 3)).points
-        self.check_points(surface, at)
+        self._geometry.check_points(surface, at)
         return BrushGesture(mesh, at, radius=radius, spacing=spacing)
 
 

@@ -19,7 +19,7 @@ from contact_core.contact.shape import PatchShape
 from contact_core.document.document import Color, Patch
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import Erase, Extend, Group, Paint, Remove
-from contact_core.edit.verbs.editor import Editor
+from contact_core.edit.verbs.group import VerbGroup
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 
@@ -35,16 +35,8 @@ _SEVEN: tuple[Color, ...] = (  # Okabe and Ito: told apart also by colour-blind 
 PALETTE: tuple[Color, ...] = (*_SEVEN, *((0.55 * r, 0.55 * g, 0.55 * b) for r, g, b in _SEVEN))  # then darker ones
 
 
-class PaintingVerbs(Editor):
+class PaintingVerbs(VerbGroup):
     """Paint, erase, merge, split, remove."""
-
-    def default_axis(
-        self, surface: str, patch: str, points: SurfacePoints, generator: str | AxisGenerator | None
-    ) -> SurfacePoints:
-        """Axis points for a patch that was painted without; a session asks its axis generators."""
-        raise InvalidInput(
-            f"the patch {patch!r} needs an axis: pass `axis` with one point and a heading, or with more points."
-        )
 
     def paint(
         self,
@@ -58,21 +50,22 @@ class PaintingVerbs(Editor):
         generator: str | AxisGenerator | None = None,
         strength: Any = None,
         color: Color | None = None,
-    ) -> int:
+    ) -> None:
         """Paint points: a new patch, or more points on one that exists (and on all that share its shape).
 
         A new patch needs `surface`, and an axis: picked points, or one of a generator: its name, or one made with
         settings (`plugins.make`). strength: (n,) 0..1, a brush's falloff, multiplies the default weights. Points
         painted twice are kept once.
         """
-        if patch in self.document.patches:
-            return self.submit(self._extension(patch, points, strength))
+        if patch in self._document.patches:
+            self._editor.do(self._extension(patch, points, strength))
+            return
         if surface is None:
             raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")
-        picks = axis if axis is not None else self.default_axis(surface, patch, points, generator)
-        return self.submit(self.painting(patch, surface, points, picks, heading, dense, strength, color))
+        picks = self._default_axis(surface, patch, points, generator) if axis is None else axis
+        self._editor.do(self._painting(patch, surface, points, picks, heading, dense, strength, color))
 
-    def painting(
+    def _painting(
         self,
         patch: str,
         surface: str,
@@ -87,8 +80,8 @@ class PaintingVerbs(Editor):
     ) -> Paint:
         """The command that paints a new patch; `number` counts those painted with it."""
         shape, placed = self._shape(surface, points, picks, heading, dense, strength)
-        color = color or PALETTE[(len(self.document.patches) + number) % len(PALETTE)]
-        key = self.document.free_name(patch, self.document.shapes)
+        color = color or PALETTE[(len(self._document.patches) + number) % len(PALETTE)]
+        key = self._document.free_name(patch, self._document.shapes)
         return Paint(Patch(patch, surface, key, placed.root(), color=color), shape)
 
     def paint_region(
@@ -102,79 +95,92 @@ class PaintingVerbs(Editor):
         if not points:
             raise InvalidInput(f"the region {name!r} has no points.")
         for surface, batch in points.items():
-            self.check_points(surface, batch)
-        parts = [(s, part) for s, batch in points.items() for part in connected_parts(self.mesh(s), batch)]
-        if len(parts) > 1 and name in self.document.groups:
+            self._geometry.check_points(surface, batch)
+        parts = [
+            (s, part) for s, batch in points.items() for part in connected_parts(self._geometry.mesh(s), batch)
+        ]
+        if len(parts) > 1 and name in self._document.groups:
             raise CommandRejected(f"there is a group {name!r} already.")
         commands: list[Command] = []
         names: list[str] = []
-        taken = dict.fromkeys(self.document.patches)
+        taken = dict.fromkeys(self._document.patches)
         for number, (surface, part) in enumerate(parts, start=1):
-            patch = self.document.free_name(name if len(parts) == 1 else f"{name}.{number}", taken)
+            patch = self._document.free_name(name if len(parts) == 1 else f"{name}.{number}", taken)
             taken[patch] = None
             picks = (axes or {}).get(surface)
             if picks is None:
-                picks = self.default_axis(surface, patch, part, None)
-            commands.append(self.painting(patch, surface, part, picks, number=len(names)))
+                picks = self._default_axis(surface, patch, part)
+            commands.append(self._painting(patch, surface, part, picks, number=len(names)))
             names.append(patch)
         if len(parts) > 1:
             commands.append(Group(name, tuple(names)))
-        self.submit(Macro(f"Paint {name}", tuple(commands)))
+        self._editor.do(Macro(f"Paint {name}", tuple(commands)))
         return tuple(names)
 
     def erase(
         self, patch: str, indices: Any = None, *, near: SurfacePoints | None = None, radius: float = 0.0
-    ) -> int:
+    ) -> None:
         """Erase points by index, or those within `radius` of surface points (straight distance, surface units)."""
         if (indices is None) == (near is None):
             raise InvalidInput("erase needs either indices or points to erase near.")
         if near is not None:
-            self.check_points(self.document.patch(patch).surface, near)
-            mesh = self.mesh_of(patch)
-            indices = np.flatnonzero(nearest(self.points(patch).positions(mesh), near.positions(mesh)) <= radius)
+            self._geometry.check_points(self._document.patch(patch).surface, near)
+            mesh = self._geometry.mesh_of(patch)
+            here = self._geometry.points(patch).positions(mesh)
+            indices = np.flatnonzero(nearest(here, near.positions(mesh)) <= radius)
             if not len(indices):
                 raise CommandRejected(f"no point of {patch!r} lies within {radius:g} of there.")
-        return self.submit(Erase(patch, self.point_indices(patch, indices)))
+        self._editor.do(Erase(patch, self._point_indices(patch, indices)))
 
-    def merge(self, patch: str, others: Sequence[str]) -> int:
-        """Join patches of one surface into the first. The others are removed, and what hung on them hangs on the
-        first, where it is. A place that several of them hold is kept once."""
+    def merge(self, patch: str, others: Sequence[str]) -> None:
+        """Join patches of one surface into the first. The others are removed, and their children become children of
+        the first, where they are. A place that several of them hold is kept once."""
         if not others or patch in others or len(set(others)) != len(others):
             raise CommandRejected(f"merging into {patch!r} needs other patches, each once.")
-        document, mesh = self.document, self.mesh_of(patch)
+        document, mesh = self._document, self._geometry.mesh_of(patch)
         commands: list[Command] = []
-        known = self.points(patch)
+        known = self._geometry.points(patch)
         for other in others:
             if document.patch(other).surface != document.patch(patch).surface:
                 raise CommandRejected(f"{patch!r} and {other!r} lie on different surfaces: group them instead.")
             shape = document.shape_of(other)
             area_unit = (shape.meters_per_unit / document.shape_of(patch).meters_per_unit) ** 2
-            points, weights = without_doubles(mesh, self.points(other), shape.weights * area_unit, known)
+            points, weights = without_doubles(mesh, self._geometry.points(other), shape.weights * area_unit, known)
             if len(points):
-                commands.append(Extend(patch, self.measured(patch, points), weights))
+                commands.append(Extend(patch, self._measured(patch, points), weights))
             known = SurfacePoints.concatenate([known, points])
         commands.append(Remove(tuple(others), tuple(self._adopted(patch, others))))
-        return self.submit(Macro(f"Merge {', '.join([patch, *others])}", tuple(commands)))
+        self._editor.do(Macro(f"Merge {', '.join([patch, *others])}", tuple(commands)))
 
-    def split(self, patch: str, indices: Any, name: str) -> int:
+    def split(self, patch: str, indices: Any, name: str) -> None:
         """Take points out of a patch into a new one with the same axis."""
-        source = self.document.patch(patch)
-        shape = self.document.shapes[source.shape]
-        taken = self.point_indices(patch, indices)
+        source = self._document.patch(patch)
+        shape = self._document.shapes[source.shape]
+        taken = self._point_indices(patch, indices)
         if len(taken) == len(shape):
             raise CommandRejected(f"splitting takes some points of {patch!r}, but all came: rename it instead.")
         chosen = np.zeros(len(shape), dtype=bool)
         chosen[taken] = True
-        color = PALETTE[len(self.document.patches) % len(PALETTE)]
-        key = self.document.free_name(name, self.document.shapes)
+        color = PALETTE[len(self._document.patches) % len(PALETTE)]
+        key = self._document.free_name(name, self._document.shapes)
         part = replace(source, name=name, shape=key, original=True, color=color)
-        return self.submit(
+        self._editor.do(
             Macro(f"Split {name} off {patch}", (Erase(patch, taken), Paint(part, shape.select(chosen))))
         )
 
-    def remove(self, *patches: str) -> int:
-        """Remove patches; what hangs on them stays where it is."""
-        return self.submit(self._removal(patches))
+    def remove(self, *patches: str) -> None:
+        """Remove patches; their children stay where they are."""
+        self._editor.do(self._removal(patches))
+
+    def _default_axis(
+        self,
+        surface: str,
+        patch: str,
+        points: SurfacePoints,
+        generator: str | AxisGenerator | None = None,
+    ) -> SurfacePoints:
+        """Axis points for a patch that was painted without any."""
+        return self._editor.makers.axis(self._geometry, surface, patch, points, generator)
 
     def _shape(
         self,
@@ -185,54 +191,54 @@ class PaintingVerbs(Editor):
         dense: bool,
         strength: Any,
     ) -> tuple[PatchShape, Axis]:
-        mesh = self.mesh(surface)
-        self.check_points(surface, points)
-        self.check_points(surface, picks)
+        mesh = self._geometry.mesh(surface)
+        self._geometry.check_points(surface, points)
+        self._geometry.check_points(surface, picks)
         points, strength = without_doubles(mesh, points, strength)
         axis_shape, axis = draw_axis(mesh, picks, heading, dense=dense)
-        coordinates = parameterize_patch(mesh, axis, points, engine=self.derived.engine)
+        coordinates = parameterize_patch(mesh, axis, points, engine=self._editor.derived.engine)
         bare = PatchShape(
-            axis_shape, coordinates, np.ones(len(points)), self.document.surface(surface).meters_per_unit
+            axis_shape, coordinates, np.ones(len(points)), self._document.surface(surface).meters_per_unit
         )
         shares = measure_area(bare, points.positions(mesh)).shares
         return replace(bare, weights=shares * strength), axis
 
     def _extension(self, patch: str, points: SurfacePoints, strength: Any) -> Extend:
-        here = self.points(patch)
-        self.check_points(self.document.patch(patch).surface, points)
-        points, strength = without_doubles(self.mesh_of(patch), points, strength, here)
+        here = self._geometry.points(patch)
+        self._geometry.check_points(self._document.patch(patch).surface, points)
+        points, strength = without_doubles(self._geometry.mesh_of(patch), points, strength, here)
         if not len(points):
             raise CommandRejected(f"all of these points are on {patch!r} already.")
-        coordinates = self.measured(patch, points)
-        shape = self.document.shape_of(patch).extended(coordinates, np.ones(len(points)))
-        together = SurfacePoints.concatenate([here, points]).positions(self.mesh_of(patch))
+        coordinates = self._measured(patch, points)
+        shape = self._document.shape_of(patch).extended(coordinates, np.ones(len(points)))
+        together = SurfacePoints.concatenate([here, points]).positions(self._geometry.mesh_of(patch))
         shares = measure_area(shape, together).shares[len(here) :] / self._area_unit(patch)
         return Extend(patch, coordinates, shares * strength)
 
     def _area_unit(self, patch: str) -> float:
         """Square surface units of the patch's surface per square unit of its shape."""
-        return self.derived.unit(self.document, patch) ** 2
+        return self._geometry.unit(patch) ** 2
 
     def _removal(self, patches: tuple[str, ...]) -> Remove:
         """Remove patches, with roots for the children that stay."""
-        children = [c for name in patches for c in self.document.children(name) if c not in patches]
-        return Remove(patches, tuple((child, self.root(child)) for child in children))
+        children = [c for name in patches for c in self._document.children(name) if c not in patches]
+        return Remove(patches, tuple((child, self._geometry.root(child)) for child in children))
 
     def _adopted(self, patch: str, others: Sequence[str]) -> Iterator[tuple[str, Placement]]:
-        """Where the children of patches go that are merged into one: they hang on it by its first point, unless it
-        hangs on them, which it did not do before."""
-        above = {patch, *self.document.ancestors(patch)}
-        children = [c for other in others for c in self.document.children(other) if c not in others]
+        """Where the children of patches go that are merged into one: they become children of it by its first point,
+        unless it is a child of theirs, which it was not before."""
+        above = {patch, *self._document.ancestors(patch)}
+        children = [c for other in others for c in self._document.children(other) if c not in others]
         for child in sorted(children, key=lambda name: name not in above):  # roots first: no cycle on the way
             if child in above:
-                yield child, self.root(child)
+                yield child, self._geometry.root(child)
                 continue
-            link = self.document.patch(child).placement
+            link = self._document.patch(child).placement
             assert isinstance(link, Link)
-            own, point = self.axis(child), link.own_point
+            own, point = self._geometry.axis(child), link.own_point
             yield (
                 child,
-                self.relinked(
+                self._relinked(
                     child,
                     replace(link, parent=patch, parent_point=0),
                     own.points[point],

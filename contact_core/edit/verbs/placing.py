@@ -14,72 +14,75 @@ from contact_core.contact.transfer import transported
 from contact_core.document.document import Patch
 from contact_core.edit.command import apply_command
 from contact_core.edit.commands import Bend, LinkPatch, Mirror, Rotate, Scale, Transfer, Translate, Unlink
-from contact_core.edit.verbs.editor import Editor
+from contact_core.edit.verbs.group import VerbGroup
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 
 
-class PlacingVerbs(Editor):
+class PlacingVerbs(VerbGroup):
     """Translate, rotate, bend, scale, mirror, transfer, link."""
 
-    def translate(self, patch: str, to: SurfacePoints) -> int:
+    def translate(self, patch: str, to: SurfacePoints) -> None:
         """Move a patch so that its first axis point comes to one surface point, kept parallel along the way."""
-        root = transported(self.mesh_of(patch), self.root(patch), to)
-        return self.submit(Translate(patch, self.placement_at(patch, root)))
+        root = transported(self._geometry.mesh_of(patch), self._geometry.root(patch), to)
+        self._editor.do(Translate(patch, self._placement_at(patch, root)))
 
     def place(
         self, patch: str, point: SurfacePoints, *, heading: complex | None = None, direction: Any = None
-    ) -> int:
+    ) -> None:
         """Move a patch to a surface point with a given heading, or a direction (3,) in surface space."""
-        root = self.root_at(self.document.patch(patch).surface, point, heading, direction)
-        return self.submit(Translate(patch, self.placement_at(patch, root)))
+        root = self._geometry.root_at(self._document.patch(patch).surface, point, heading, direction)
+        self._editor.do(Translate(patch, self._placement_at(patch, root)))
 
-    def rotate(self, patch: str, angle: float, *, about: int = 0) -> int:
+    def rotate(self, patch: str, angle: float, *, about: int = 0) -> None:
         """Turn a patch by `angle` (radians, counter-clockwise seen from outside) about one of its axis points."""
         turn = cmath.exp(1j * angle)
-        link = self.document.patch(patch).placement
+        link = self._document.patch(patch).placement
         if isinstance(link, Link) and link.own_point == about:
-            return self.submit(Rotate(patch, replace(link, heading=link.heading + angle)))
+            self._editor.do(Rotate(patch, replace(link, heading=link.heading + angle)))
+            return
         if about == 0:
-            root = self.root(patch)
-            return self.submit(Rotate(patch, self.placement_at(patch, root.heading_to(root.heading * turn))))
-        axis = self.axis(patch)
-        self.check_axis_point(patch, about)
+            root = self._geometry.root(patch)
+            self._editor.do(Rotate(patch, self._placement_at(patch, root.heading_to(root.heading * turn))))
+            return
+        axis = self._geometry.axis(patch)
+        self._check_axis_point(patch, about)
         root, cut = root_from_point(
-            self.mesh_of(patch),
-            self.document.effective_axis(patch),
+            self._geometry.mesh_of(patch),
+            self._document.effective_axis(patch),
             about,
             axis.points[about],
             complex(axis.tangents[about]) * turn,
-            mirrored=self.document.patch(patch).mirrored,
-            unit=self.derived.unit(self.document, patch),
+            mirrored=self._document.patch(patch).mirrored,
+            unit=self._geometry.unit(patch),
         )
         if cut > 0.0:
             raise CommandRejected(f"turned about point {about}, the axis of {patch!r} would start off the surface.")
-        return self.submit(Rotate(patch, self.placement_at(patch, root)))
+        self._editor.do(Rotate(patch, self._placement_at(patch, root)))
 
-    def bend(self, patch: str, point: int, angle: float) -> int:
+    def bend(self, patch: str, point: int, angle: float) -> None:
         """Turn the part of a patch from an interior axis point on by `angle` (radians, counter-clockwise here)."""
-        axis = self.document.effective_axis(patch)
+        axis = self._document.effective_axis(patch)
         axis.check_bend(point)
-        sign = -1.0 if self.document.patch(patch).mirrored else 1.0
-        return self.submit(Bend(patch, point, float(axis.turning_angles[point - 1]) + sign * angle))
+        sign = -1.0 if self._document.patch(patch).mirrored else 1.0
+        self._editor.do(Bend(patch, point, float(axis.turning_angles[point - 1]) + sign * angle))
 
-    def scale(self, patch: str, *, along: float | None = None, spread: float | None = None) -> int:
+    def scale(self, patch: str, *, along: float | None = None, spread: float | None = None) -> None:
         """Set the factors along the axis and across it (1: as painted); None leaves a factor as it is.
 
         Raises InvalidInput for a size at which the patch cannot be traced.
         """
-        axis = self.document.effective_axis(patch)
+        axis = self._document.effective_axis(patch)
         along, spread = axis.along if along is None else along, axis.spread if spread is None else spread
         command = Scale(patch, along, spread)
-        self.derived.patch(apply_command(command, self.document), patch)  # kept, so drawing it traces nothing again
-        return self.submit(command)
+        scaled = apply_command(command, self._document)
+        self._editor.derived.patch(scaled, patch)  # kept, so drawing it traces nothing again
+        self._editor.do(command)
 
-    def mirror(self, patch: str, mirrored: bool | None = None) -> int:
+    def mirror(self, patch: str, mirrored: bool | None = None) -> None:
         """Turn a patch into its mirror image about its first direction, or back."""
-        now = self.document.patch(patch).mirrored
-        return self.submit(Mirror(patch, not now if mirrored is None else mirrored))
+        now = self._document.patch(patch).mirrored
+        self._editor.do(Mirror(patch, not now if mirrored is None else mirrored))
 
     def transfer(
         self,
@@ -92,7 +95,7 @@ class PlacingVerbs(Editor):
         name: str | None = None,
         mirrored: bool = True,
     ) -> str:
-        """Copy a patch onto a surface at a point; answers the name of the copy, which shares the shape.
+        """Copy a patch onto a surface at a point; returns the name of the copy, which shares the shape.
 
         mirrored: as the mirror image of the patch, as contact wants it. Onto the same surface say False.
         """
@@ -113,10 +116,10 @@ class PlacingVerbs(Editor):
         mirrored: bool = True,
         descendants: bool = True,
     ) -> dict[str, str]:
-        """Copy a patch and all that hangs on it, in one go; answers the copies' names by the names copied."""
-        document = self.document
+        """Copy a patch and all its descendants, in one go; returns the copies' names by the names copied."""
+        document = self._document
         target = document.surface(surface)
-        root = self.root_at(surface, point, heading, direction)
+        root = self._geometry.root_at(surface, point, heading, direction)
         units = document.surface(document.patch(patch).surface).meters_per_unit / target.meters_per_unit
         copies: dict[str, Patch] = {}
         taken = dict.fromkeys(document.patches)
@@ -136,47 +139,47 @@ class PlacingVerbs(Editor):
                 along=source.along if not source.original else 1.0,
                 spread=source.spread if not source.original else 1.0,
             )
-        self.submit(Transfer(tuple(copies.values())))
+        self._editor.do(Transfer(tuple(copies.values())))
         return {name: copy.name for name, copy in copies.items()}
 
     def symmetric_copy(
         self, patch: str, *, normal: Any = (1.0, 0.0, 0.0), offset: float = 0.0, name: str | None = None
     ) -> str:
         """Copy a patch across a mirror plane of its surface (points x with normal . x = offset)."""
-        surface = self.document.patch(patch).surface
-        root, _ = mirrored_root(self.mesh(surface), self.root(patch), normal, offset)
+        surface = self._document.patch(patch).surface
+        root, _ = mirrored_root(self._geometry.mesh(surface), self._geometry.root(patch), normal, offset)
         return self.transfer(patch, surface, root.point(), heading=root.heading, name=name)
 
-    def link(self, child: str, parent: str, *, parent_point: int = 0, own_point: int = 0) -> int:
-        """Hang a patch on a parent, by the geodesic between two axis points, where both are now."""
+    def link(self, child: str, parent: str, *, parent_point: int = 0, own_point: int = 0) -> None:
+        """Make a patch the child of another, by the geodesic between two axis points, where both are now."""
         for name in (child, parent):
-            self.document.patch(name)
-        if child == parent or child in self.document.ancestors(parent):
-            raise CommandRejected(f"{child!r} cannot hang on {parent!r}: that one hangs on it already.")
-        if self.document.patch(child).surface != self.document.patch(parent).surface:
+            self._document.patch(name)
+        if child == parent or child in self._document.ancestors(parent):
+            raise CommandRejected(f"{child!r} cannot be a child of {parent!r}, which descends from it.")
+        if self._document.patch(child).surface != self._document.patch(parent).surface:
             raise CommandRejected(f"{child!r} and {parent!r} lie on different surfaces; a link is a path on one.")
-        axis = self.axis(child)
-        self.check_axis_point(child, own_point)
+        axis = self._geometry.axis(child)
+        self._check_axis_point(child, own_point)
         link = link_to(
-            self.mesh_of(child),
+            self._geometry.mesh_of(child),
             parent,
-            self.axis(parent),
+            self._geometry.axis(parent),
             axis.points[own_point],
             complex(axis.tangents[own_point]),
             parent_point=parent_point,
             own_point=own_point,
         )
-        return self.submit(LinkPatch(child, link))
+        self._editor.do(LinkPatch(child, link))
 
-    def unlink(self, child: str) -> int:
+    def unlink(self, child: str) -> None:
         """Take a patch off its parent; it stays where it is."""
-        return self.submit(Unlink(child, self.root(child)))
+        self._editor.do(Unlink(child, self._geometry.root(child)))
 
 
 def _copied_link(source: Patch, copies: dict[str, Patch], mirrored: bool, units: float) -> Root | Link:
     """The link of a copied child: to its parent's copy, mirrored with it, in the target's units."""
     link = source.placement
     if not isinstance(link, Link):
-        raise InvalidInput(f"{source.name!r} hangs on nothing.")
+        raise InvalidInput(f"{source.name!r} is the child of no patch.")
     link = replace(link, parent=copies[link.parent].name).scaled(units)
     return link.mirrored() if mirrored else link

@@ -15,7 +15,7 @@ from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.document.document import Surface
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.commands import RebindSurface
-from contact_core.edit.verbs.editor import Editor
+from contact_core.edit.editor import Editor
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
@@ -40,7 +40,7 @@ def plan_rebind(editor: Editor, new: Surface, mesh: TriangleMesh) -> tuple[Rebin
     Points and axes of original patches are projected to their closest points and measured anew; copies keep their
     shape and get their root and direction projected. Links are drawn anew between the projected axes.
     """
-    document, old_mesh = editor.document, editor.mesh(new.name)
+    document, old_mesh = editor.document, editor.geometry.mesh(new.name)
     on_it = [name for name, patch in document.patches.items() if patch.surface == new.name]
     shapes: dict[str, PatchShape] = {}
     axes: dict[str, Axis] = {}
@@ -55,10 +55,10 @@ def plan_rebind(editor: Editor, new: Surface, mesh: TriangleMesh) -> tuple[Rebin
         unit = shape.meters_per_unit / new.meters_per_unit
         own = _effective(shape, patch.turns if name not in axes else (), patch.along, patch.spread, name in axes)
         if name not in axes:
-            root = _projected_root(editor.root(name), old_mesh, mesh)
+            root = _projected_root(editor.geometry.root(name), old_mesh, mesh)
             axes[name] = reconstruct_axis(mesh, own, root, mirrored=patch.mirrored, unit=unit)
         points = points_from_axis(mesh, shape.coordinates, axes[name], own, mirrored=patch.mirrored, unit=unit)
-        before = editor.points(name).positions(old_mesh)
+        before = editor.geometry.points(name).positions(old_mesh)
         moves[name] = float(np.linalg.norm(points.points.positions(mesh) - before, axis=1).max(initial=0.0))
     placements = [(name, _placed(editor, name, mesh, axes)) for name in on_it]
     placements += _links_elsewhere(editor, new.name, shapes)
@@ -75,9 +75,9 @@ def _links_elsewhere(
         if not isinstance(link, Link) or patch.surface == surface:
             continue
         if {patch.shape, editor.document.patch(link.parent).shape} & set(shapes):
-            root, above = editor.root(name), editor.root(link.parent)
+            root, above = editor.geometry.root(name), editor.geometry.root(link.parent)
             first = Axis(above.point(), np.array([above.heading]), np.zeros(1))
-            yield name, link_to(editor.mesh_of(name), link.parent, first, root.point(), root.heading)
+            yield name, link_to(editor.geometry.mesh_of(name), link.parent, first, root.point(), root.heading)
 
 
 def _projected_shape(
@@ -86,10 +86,10 @@ def _projected_shape(
     """The shape of an original patch measured on the new mesh, its own deviation included."""
     patch = editor.document.patch(name)
     old = editor.document.shapes[patch.shape]
-    axis_points = _closest(editor.axis(name).points, old_mesh, mesh)
-    heading = _projected_root(editor.root(name), old_mesh, mesh).heading
+    axis_points = _closest(editor.geometry.axis(name).points, old_mesh, mesh)
+    heading = _projected_root(editor.geometry.root(name), old_mesh, mesh).heading
     drawn, axis = draw_axis(mesh, axis_points, heading, dense=False)
-    points = _closest(editor.points(name), old_mesh, mesh)
+    points = _closest(editor.geometry.points(name), old_mesh, mesh)
     unit = old.meters_per_unit / new.meters_per_unit
     coordinates = parameterize_patch(
         mesh, axis, points, mirrored=patch.mirrored, unit=unit, engine=editor.derived.engine

@@ -30,32 +30,32 @@ class ReshapingVerbs(PaintingVerbs):
         heading: complex | None = None,
         dense: bool = True,
         generator: str | AxisGenerator | None = None,
-    ) -> int:
+    ) -> None:
         """Draw the axis of a patch anew. Its points, its children and its partners stay where they are."""
-        surface = self.document.patch(patch).surface
-        points = self.points(patch)
+        surface = self._document.patch(patch).surface
+        points = self._geometry.points(patch)
         if picks is None:
-            picks = self.default_axis(surface, patch, points, generator)
-        self.check_points(surface, picks)
-        shape, axis = draw_axis(self.mesh(surface), picks, heading, dense=dense)
-        return self.submit(self._reshaping(patch, points, shape, axis, "Set the axis of"))
+            picks = self._default_axis(surface, patch, points, generator)
+        self._geometry.check_points(surface, picks)
+        shape, axis = draw_axis(self._geometry.mesh(surface), picks, heading, dense=dense)
+        self._editor.do(self._reshaping(patch, points, shape, axis, "Set the axis of"))
 
-    def bind(self, patch: str, indices: Any, axis_point: int) -> int:
+    def bind(self, patch: str, indices: Any, axis_point: int) -> None:
         """Anchor points to an axis point chosen by hand, in place of the closest one."""
-        self.check_axis_point(patch, axis_point)
-        shape = self.document.shape_of(patch)
+        self._check_axis_point(patch, axis_point)
+        shape = self._document.shape_of(patch)
         anchors = shape.coordinates.anchors.copy()
-        anchors[self.point_indices(patch, indices)] = axis_point
-        coordinates = self.measured(patch, self.points(patch), anchors)
-        return self.submit(Reshape(patch, replace(shape, coordinates=coordinates), (), "Bind points of"))
+        anchors[self._point_indices(patch, indices)] = axis_point
+        coordinates = self._measured(patch, self._geometry.points(patch), anchors)
+        self._editor.do(Reshape(patch, replace(shape, coordinates=coordinates), (), "Bind points of"))
 
-    def weigh(self, patch: str, weights: Any) -> int:
+    def weigh(self, patch: str, weights: Any) -> None:
         """Set the weights (n,) of the points of a patch."""
-        return self.submit(Weigh(patch, weights))
+        self._editor.do(Weigh(patch, weights))
 
-    def detach(self, patch: str) -> int:
+    def detach(self, patch: str) -> None:
         """Give a patch a shape of its own, so that it follows its partners no more."""
-        return self.submit(Detach(patch, self.document.free_name(patch, self.document.shapes)))
+        self._editor.do(Detach(patch, self._document.free_name(patch, self._document.shapes)))
 
     def _reshaping(
         self,
@@ -66,9 +66,9 @@ class ReshapingVerbs(PaintingVerbs):
         title: str,
     ) -> Reshape:
         """A new axis under a patch: coordinates anew, and placements that keep everything where it is."""
-        source = self.document.patch(patch)
-        mesh = self.mesh_of(patch)
-        unit = self.derived.unit(self.document, patch)
+        source = self._document.patch(patch)
+        mesh = self._geometry.mesh_of(patch)
+        unit = self._geometry.unit(patch)
         if source.turns or source.along != 1.0 or source.spread != 1.0:
             raise CommandRejected(
                 f"{patch!r} deviates from the shape that it shares: draw the axis on the original, or detach it."
@@ -76,11 +76,11 @@ class ReshapingVerbs(PaintingVerbs):
         coordinates = parameterize_patch(mesh, axis, points, mirrored=source.mirrored, unit=unit)
         turns = -shape.turning_angles if source.mirrored else shape.turning_angles
         drawn = AxisShape(shape.lengths / unit, turns)
-        old = self.document.shapes[source.shape]
+        old = self._document.shapes[source.shape]
         new = replace(old, axis=drawn, coordinates=coordinates)
         placements: list[tuple[str, Placement]] = []
         roots = {patch: axis.root()} | {
-            partner: self._followed(patch, partner, axis) for partner in self.document.partners(patch)
+            partner: self._followed(patch, partner, axis) for partner in self._document.partners(patch)
         }
         for name, root in roots.items():
             placements.append((name, self._rooted(name, root)))
@@ -89,31 +89,31 @@ class ReshapingVerbs(PaintingVerbs):
 
     def _followed(self, patch: str, partner: str, axis: Axis) -> Root:
         """Where a partner has the new first axis point of a patch: the way there from the old axis, over there."""
-        here, there = self.axis(patch), self.axis(partner)
-        way = link_to(self.mesh_of(patch), patch, here, axis.points[0], complex(axis.tangents[0]))
-        if self.document.patch(patch).mirrored != self.document.patch(partner).mirrored:
+        here, there = self._geometry.axis(patch), self._geometry.axis(partner)
+        way = link_to(self._geometry.mesh_of(patch), patch, here, axis.points[0], complex(axis.tangents[0]))
+        if self._document.patch(patch).mirrored != self._document.patch(partner).mirrored:
             way = way.mirrored()
-        ratio = self.derived.unit(self.document, partner) / self.derived.unit(self.document, patch)
-        point, tangent, _ = follow_link(self.mesh_of(partner), there, way.scaled(ratio))
+        ratio = self._geometry.unit(partner) / self._geometry.unit(patch)
+        point, tangent, _ = follow_link(self._geometry.mesh_of(partner), there, way.scaled(ratio))
         return Root.at(point, tangent)
 
     def _rooted(self, name: str, root: Root) -> Placement:
-        """A placement for a patch whose axis will be another one; a linked patch then hangs by its first point."""
-        link = self.document.patch(name).placement
+        """A placement for a patch whose axis will be another one; a child is then linked by its first point."""
+        link = self._document.patch(name).placement
         if not isinstance(link, Link):
             return root
-        return self.relinked(name, replace(link, own_point=0), root.point(), root.heading)
+        return self._relinked(name, replace(link, own_point=0), root.point(), root.heading)
 
     def _children_kept(self, name: str, root: Root) -> list[tuple[str, Placement]]:
         """Links that keep the children of a patch where they are, from the first point of its new axis."""
         kept: list[tuple[str, Placement]] = []
-        for child in self.document.children(name):
-            link = self.document.patch(child).placement
+        for child in self._document.children(name):
+            link = self._document.patch(child).placement
             assert isinstance(link, Link)
-            own = self.axis(child)
+            own = self._geometry.axis(child)
             first = Axis(root.point(), np.array([root.heading]), np.zeros(1))
             kept.append((child, link_to(
-                self.mesh_of(child), name, first, own.points[link.own_point],
+                self._geometry.mesh_of(child), name, first, own.points[link.own_point],
                 complex(own.tangents[link.own_point]), own_point=link.own_point,
             )))  # fmt: skip
         return kept

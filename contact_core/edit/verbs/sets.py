@@ -11,27 +11,27 @@ from contact_core.document.document import Patch
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.library import ContactSet, load_contact_set, save_contact_set
 from contact_core.edit.commands import Import
-from contact_core.edit.verbs.editor import Editor
+from contact_core.edit.verbs.group import VerbGroup
 from contact_core.errors import InvalidInput
 
 
-class SetVerbs(Editor):
-    """Export and import."""
+class ContactSets(VerbGroup):
+    """Patches saved with their links, pairs and groups, and loaded again."""
 
-    def contact_set(self, title: str, patches: Iterable[str] | None = None) -> ContactSet:
+    def of(self, title: str, patches: Iterable[str] | None = None) -> ContactSet:
         """Patches, all by default, as a set that is complete in itself.
 
         A patch whose parent is left out gets the root where it is now; pairs and groups come along where all their
         patches do.
         """
-        document = self.document
+        document = self._document
         names = list(document.patches if patches is None else patches)
         chosen: dict[str, Patch] = {}
         owned: set[str] = set()
         for name in names:
             patch = document.patch(name)
             if isinstance(patch.placement, Link) and patch.placement.parent not in names:
-                patch = replace(patch, placement=self.root(name))
+                patch = replace(patch, placement=self._geometry.root(name))
             chosen[name] = patch
             owned |= {patch.shape} if patch.original else set()
         for name, patch in chosen.items():  # where the original stays behind, the first copy takes its part
@@ -48,32 +48,32 @@ class SetVerbs(Editor):
             FrozenMap({n: members for n, members in document.groups.items() if set(members) <= set(chosen)}),
         )
 
-    def export_set(self, path: Path | str, title: str, patches: Iterable[str] | None = None) -> ContactSet:
+    def write(self, path: Path | str, title: str, patches: Iterable[str] | None = None) -> ContactSet:
         """Save patches, all by default, with their links, pairs and groups. Raises FileRefused."""
-        found = self.contact_set(title, patches)
+        found = self.of(title, patches)
         save_contact_set(found, path)
         return found
 
-    def import_set(
+    def read(
         self,
         source: ContactSet | Path | str,
         *,
         onto: Mapping[str, str] | None = None,
         roots: Mapping[str, Root] | None = None,
     ) -> dict[str, str]:
-        """Load a set; answers the new names by the names in the set. Names that are taken get a number.
+        """Load a set; returns the new names by the names in the set. Names that are taken get a number.
 
         onto: by surface of the set, the surface to load onto (the same name by default). Where that has the same
-        topology, everything goes where it was. On another surface each patch that hangs on no other needs an
-        entry in `roots`, and what hangs on it follows by its links. Raises InvalidInput naming what is missing.
+        topology, everything goes where it was. On another surface each patch that is no child needs an
+        entry in `roots`, and its descendants follow by their links. Raises InvalidInput naming what is missing.
         """
         loaded = source if isinstance(source, ContactSet) else load_contact_set(source)
-        names = self._fresh(loaded.patches, self.document.patches)
-        keys = self._fresh(loaded.shapes, self.document.shapes)
+        names = self._fresh(loaded.patches, self._document.patches)
+        keys = self._fresh(loaded.shapes, self._document.shapes)
         patches, missing = [], []
         for patch in loaded.parents_first():
             old = loaded.surfaces[patch.surface]
-            new = self.document.surface((onto or {}).get(old.name, old.name))
+            new = self._document.surface((onto or {}).get(old.name, old.name))
             placement = patch.placement
             if isinstance(placement, Link):
                 units = old.meters_per_unit / new.meters_per_unit
@@ -88,21 +88,21 @@ class SetVerbs(Editor):
             raise InvalidInput(
                 f"the set {loaded.title!r} was painted on another mesh: give roots for {', '.join(missing)}."
             )
-        pair_names = self._fresh(loaded.pairs, self.document.pairs)
+        pair_names = self._fresh(loaded.pairs, self._document.pairs)
         pairs = [
             replace(pair, name=pair_names[name], manipulator=names[pair.manipulator], object=names[pair.object])
             for name, pair in loaded.pairs.items()
         ]
-        group_names = self._fresh(loaded.groups, self.document.groups)
+        group_names = self._fresh(loaded.groups, self._document.groups)
         groups = {group_names[name]: tuple(names[m] for m in members) for name, members in loaded.groups.items()}
         shapes = {keys[key]: shape for key, shape in loaded.shapes.items()}
-        self.submit(Import(tuple(patches), FrozenMap(shapes), tuple(pairs), FrozenMap(groups), loaded.title))
+        self._editor.do(Import(tuple(patches), FrozenMap(shapes), tuple(pairs), FrozenMap(groups), loaded.title))
         return names
 
     def _fresh(self, wanted: Iterable[str], among: Mapping[str, object]) -> dict[str, str]:
         """By each wanted name the one that it gets, which nothing of the document has, nor any other of them."""
         taken, names = dict.fromkeys(among), {}
         for name in wanted:
-            names[name] = self.document.free_name(name, taken)
+            names[name] = self._document.free_name(name, taken)
             taken[names[name]] = None
         return names

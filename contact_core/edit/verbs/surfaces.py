@@ -7,35 +7,33 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contact_core.contact.axis_generator import AxisRequest
 from contact_core.document.document import Surface
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.edit.commands import AddSurface, RebindSurface
-from contact_core.edit.verbs.editor import Editor
+from contact_core.edit.commands import (
+    AddSurface,
+    ClearPose,
+    PlaceSurface,
+    RebindSurface,
+    RemoveSurface,
+    RenameSurface,
+    SetPose,
+)
+from contact_core.edit.verbs.group import VerbGroup
 from contact_core.edit.verbs.rebinding import RebindReport, plan_rebind
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.rig.bones import bones_of
-from contact_core.rig.rig import Rig
+from contact_core.rig.rig import Pose, Rig
 
 
-class SurfaceVerbs(Editor):
-    """Bring, rebind and pose the meshes behind surfaces.
-
-    rigs: by surface. known_meshes: by content digest, those of earlier revisions among them.
-    """
-
-    rigs: dict[str, Rig]
-    known_meshes: dict[str, TriangleMesh]
+class Surfaces(VerbGroup):
+    """Add, rebind, rename, remove, place and pose surfaces, and bring the meshes and rigs behind them."""
 
     @property
     def meshes(self) -> dict[str, TriangleMesh]:
         """The meshes that were brought, by the names of their surfaces in the document as it is now."""
-        surfaces, known = self.document.surfaces.values(), self.known_meshes
-        return {surface.name: known[surface.digest] for surface in surfaces if surface.digest in known}
+        return self._editor.derived.meshes(self._document)
 
-    def add_surface(
+    def add(
         self,
         name: str,
         mesh: TriangleMesh,
@@ -50,7 +48,7 @@ class SurfaceVerbs(Editor):
         A known name with the same content only brings the mesh. The same topology in another shape is bound
         silently. Another topology raises InvalidInput: `rebind` projects the contacts onto it.
         """
-        known = self.document.surfaces.get(name)
+        known = self._document.surfaces.get(name)
         wanted = Surface(
             name,
             mesh.digest,
@@ -67,25 +65,25 @@ class SurfaceVerbs(Editor):
                 f"{name!r} is another mesh now ({known.points} points and {known.faces} faces before,"
                 f" {wanted.points} and {wanted.faces} now): use rebind to project its contacts onto the new one."
             )
-        self.known_meshes[mesh.digest] = mesh  # before the command: who is told of it may ask for the mesh
+        self._editor.derived.bring(mesh)  # before the command: who is told of it may ask for the mesh
         if rig is not None:
-            self.rigs[name] = rig
+            self._editor.rigs[name] = rig
         if known is None:
-            self.submit(AddSurface(wanted), origin="asset")
+            self._editor.do(AddSurface(wanted), origin="asset")
         elif known.digest != wanted.digest:
-            self.submit(RebindSurface(replace(known, digest=wanted.digest), FrozenMap(), ()), origin="asset")
-        return self.document.surface(name)
+            self._editor.do(RebindSurface(replace(known, digest=wanted.digest), FrozenMap(), ()), origin="asset")
+        return self._document.surface(name)
 
     def rebind(self, name: str, mesh: TriangleMesh, *, old_mesh: TriangleMesh | None = None) -> RebindReport:
         """Put the contacts of a surface onto another mesh under the same name, and say how far they moved.
 
         The old mesh has to be known: brought before, or given. Undo goes back to it.
         """
-        known = self.document.surface(name)
+        known = self._document.surface(name)
         if old_mesh is not None:
             if old_mesh.digest != known.digest:
                 raise InvalidInput(f"the old mesh of {name!r} is not the one that its contacts were painted on.")
-            self.known_meshes[old_mesh.digest] = old_mesh
+            self._editor.derived.bring(old_mesh)
         changed = replace(
             known,
             digest=mesh.digest,
@@ -93,18 +91,33 @@ class SurfaceVerbs(Editor):
             points=len(mesh.points),
             faces=len(mesh.faces),
         )
-        command, report = plan_rebind(self, changed, mesh)
-        self.known_meshes[mesh.digest] = mesh
-        self.submit(command)
+        command, report = plan_rebind(self._editor, changed, mesh)
+        self._editor.derived.bring(mesh)
+        self._editor.do(command)
         return report
 
-    def axis_request(self, surface: str, patch: str, points: SurfacePoints) -> AxisRequest:
-        """What an axis generator gets for a patch: bones of the rig, and the axes drawn on the surface so far."""
-        others = {
-            other.name: self.axis(other.name).points
-            for other in self.document.patches.values()
-            if other.surface == surface and other.name != patch and other.original
-        }
-        rig = self.rigs.get(surface)
-        bones, owner = bones_of(rig, points) if rig is not None else (None, None)
-        return AxisRequest(self.mesh(surface), points, bones, owner, others)
+    def rename(self, surface: str, name: str) -> None:
+        """Give a surface another name, everywhere."""
+        self._keep_rig(surface, name)
+        self._editor.do(RenameSurface(surface, name))
+
+    def _keep_rig(self, surface: str, name: str) -> None:
+        """The rig is known by both names: an undo brings the old one back."""
+        if surface in self._editor.rigs:
+            self._editor.rigs[name] = self._editor.rigs[surface]
+
+    def remove(self, surface: str) -> None:
+        """Take a surface out of the document. Raises CommandRejected where patches lie on it."""
+        self._editor.do(RemoveSurface(surface))
+
+    def place(self, surface: str, world_from_surface: Any) -> None:
+        """Say where a surface stands in the scene: (4, 4), rigid."""
+        self._editor.do(PlaceSurface(surface, np.asarray(world_from_surface, dtype=float)))
+
+    def set_pose(self, surface: str, pose: Pose, *, title: str = "Pose") -> None:
+        """Put a rig into a pose: the result of a solve, or the animator's own."""
+        self._editor.do(SetPose(surface, pose, title))
+
+    def clear_pose(self, surface: str) -> None:
+        """Put a rig back to rest."""
+        self._editor.do(ClearPose(surface))

@@ -30,20 +30,20 @@ def open_session(host: Any) -> Session:
     session = Session(host=host)
     for item in host.objects():
         asset = host.read_surface(item.id)
-        session.add_surface(item.id, asset.mesh, rig=asset.rig, up_axis=asset.up_axis)
+        session.surfaces.add(item.id, asset.mesh, rig=asset.rig, up_axis=asset.up_axis)
     return session
 
 
 def paint(session: Session, seed: int) -> str:
     """A small patch somewhere on the torus; its name."""
-    mesh = session.meshes["torus"]
+    mesh = session.surfaces.meshes["torus"]
     random = np.random.default_rng(seed)
     ring = mesh.faces[random.integers(len(mesh.faces))]
     near = np.flatnonzero(np.isin(mesh.faces, ring).any(axis=1))[:8]
     points = SurfacePoints(near, np.full((len(near), 3), 1 / 3))
     axis = SurfacePoints(near[:2], np.full((2, 3), 1 / 3))
     name = session.document.free_name(f"patch{seed}")
-    session.paint(name, points, surface="torus", axis=axis)
+    session.patches.paint(name, points, surface="torus", axis=axis)
     return name
 
 
@@ -185,11 +185,11 @@ def test_one_command_is_one_step_of_blender(bpy: Any, torus: Any) -> None:
     documents = [session.document]
     name = paint(session, 5)
     documents.append(session.document)
-    session.rotate(name, 0.3)
+    session.patches.rotate(name, 0.3)
     documents.append(session.document)
     with session.macro("Two at once"):
-        session.rotate(name, 0.1)
-        session.rotate(name, 0.1)
+        session.patches.rotate(name, 0.1)
+        session.patches.rotate(name, 0.1)
     documents.append(session.document)
     for wanted in documents[-2::-1]:
         bpy.ops.ed.undo()  # as the user's Ctrl+Z does
@@ -250,12 +250,12 @@ def core_edit(session: Session, random: Any, seed: int) -> None:
     if verb == "paint":
         paint(session, seed)
     elif verb == "rotate":
-        session.rotate(str(random.choice(names)), float(random.uniform(-1, 1)))
+        session.patches.rotate(str(random.choice(names)), float(random.uniform(-1, 1)))
     elif verb == "translate":
-        near = SurfacePoints([int(random.integers(len(session.meshes["torus"].faces)))], [[0.2, 0.3, 0.5]])
-        session.translate(str(random.choice(names)), near)
+        near = SurfacePoints([int(random.integers(len(session.surfaces.meshes["torus"].faces)))], [[0.2, 0.3, 0.5]])
+        session.patches.translate(str(random.choice(names)), near)
     else:
-        session.remove(str(random.choice(names)))
+        session.patches.remove(str(random.choice(names)))
 
 
 def foreign_edit(bpy: Any, random: Any) -> None:

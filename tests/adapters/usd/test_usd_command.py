@@ -67,14 +67,14 @@ def sequence(tmp_path: Path) -> Path:
     surfaces = {name: host.read_surface(path) for name, path in (("arm", ARM), ("ball", BALL))}
     for name, path in (("arm", ARM), ("ball", BALL)):
         asset = surfaces[name]
-        session.add_surface(name, asset.mesh, rig=asset.rig, world_from_surface=host.placement(path))
+        session.surfaces.add(name, asset.mesh, rig=asset.rig, world_from_surface=host.placement(path))
     skin = surfaces["arm"].mesh
     order = np.argsort(np.linalg.norm(skin.points - [0.3, 2.8, 0.0], axis=1), kind="stable")[:6]
     points = SurfacePoints.at_vertices(skin, order)
-    session.paint("tip", points, surface="arm", axis=points[[0, 3]])
+    session.patches.paint("tip", points, surface="arm", axis=points[[0, 3]])
     ball = surfaces["ball"].mesh
     nearest = SurfacePoints.at_vertices(ball, [int(np.argmin(ball.points[:, 0]))])
-    session.pair("tip", session.transfer("tip", "ball", nearest, heading=1.0 + 0.0j))
+    session.pairs.add("tip", session.patches.transfer("tip", "ball", nearest, heading=1.0 + 0.0j))
     host.save(tmp_path / "contacts.usda")
     return tmp_path
 
@@ -103,7 +103,7 @@ def test_contacts_go_to_every_shot_and_every_frame_is_solved(
         host = UsdHost(path)
         assert host.pose_keys(ARM) == (1.0, 2.0, 3.0)
         with open_shot(path) as shot:
-            (pair,) = shot.pairs()
+            (pair,) = shot.geometry.pairs()
         for frame in (1.0, 2.0, 3.0):
             pose = host.read_pose(ARM, frame)
             poses.append(pose)

@@ -312,9 +312,9 @@ def test_every_command_survives_every_broken_file(tmp_path: Path, capsys: pytest
     key = made.add(Asset("ball", meshes.icosphere(1), meters_per_unit=1.0))
     with Session(host=made, discover=False) as session:
         mesh = made.read_surface(key).mesh
-        session.add_surface("ball", mesh)
+        session.surfaces.add("ball", mesh)
         points = SurfacePoints.at_vertices(mesh, [0, 1, 2])
-        session.paint("tip", points, surface="ball", axis=points[[0, 1]])
+        session.patches.paint("tip", points, surface="ball", axis=points[[0, 1]])
     made.save(good)
     texts: dict[str, str] = {what: f'def Mesh "m" {{\n{body}}}\n' for what, (body, _) in MESHES.items()}
     texts |= {what: skinned(skeleton, skin) for what, (skeleton, skin, _) in SKELETONS.items()}

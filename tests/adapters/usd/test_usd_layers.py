@@ -37,13 +37,13 @@ def torus_host() -> tuple[UsdHost, Session, str]:
     key = host.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
     session = Session(host=host, discover=False)
     mesh = host.read_surface(key).mesh
-    session.add_surface("torus", mesh, world_from_surface=host.placement(key))
+    session.surfaces.add("torus", mesh, world_from_surface=host.placement(key))
     order = np.argsort(np.linalg.norm(mesh.points - mesh.points[0], axis=1), kind="stable")[:30]
     axis = SurfacePoints.at_vertices(mesh, order[[0, 12]])
-    session.paint("grip (links)", SurfacePoints.at_vertices(mesh, order), surface="torus", axis=axis)
+    session.patches.paint("grip (links)", SurfacePoints.at_vertices(mesh, order), surface="torus", axis=axis)
     far = SurfacePoints.at_vertices(mesh, [int(np.argmax(np.linalg.norm(mesh.points - mesh.points[0], axis=1)))])
-    copy = session.transfer("grip (links)", "torus", far, heading=1.0 + 0.0j, mirrored=False)
-    session.pair("grip (links)", copy)
+    copy = session.patches.transfer("grip (links)", "torus", far, heading=1.0 + 0.0j, mirrored=False)
+    session.pairs.add("grip (links)", copy)
     return host, session, key
 
 
@@ -55,13 +55,13 @@ def test_patches_axes_and_pairs_come_back_equal(tmp_path: Path) -> None:
     found = {patch.name: patch for patch in contacts.read_patches(stage)}
     assert set(found) == set(session.document.patches)
     for name, patch in found.items():
-        ours = session.reconstruction(name).points
+        ours = session.geometry.reconstruction(name).points
         np.testing.assert_array_equal(patch.points.faces, ours.faces)
         np.testing.assert_allclose(patch.points.barycentric, ours.barycentric, atol=1e-6)
-        np.testing.assert_allclose(patch.positions, ours.positions(session.meshes["torus"]), atol=1e-6)
+        np.testing.assert_allclose(patch.positions, ours.positions(session.surfaces.meshes["torus"]), atol=1e-6)
         assert patch.axis is not None
-        np.testing.assert_array_equal(patch.axis.faces, session.axis(name).points.faces)
-        assert (patch.surface, patch.topology) == (key, session.meshes["torus"].topology_digest)
+        np.testing.assert_array_equal(patch.axis.faces, session.geometry.axis(name).points.faces)
+        assert (patch.surface, patch.topology) == (key, session.surfaces.meshes["torus"].topology_digest)
         assert patch.role == ("original" if session.document.patches[name].original else "transferred")
     (pair,) = contacts.read_pairs(stage)
     (wanted,) = session.document.pairs.values()
@@ -80,9 +80,9 @@ def test_what_a_layer_below_published_does_not_come_back(tmp_path: Path) -> None
     below.save(tmp_path / "below.usda")
     host = UsdHost(tmp_path / "below.usda")
     session = Session(host=host, discover=False)
-    session.add_surface("torus", host.read_surface(key).mesh, world_from_surface=host.placement(key))
+    session.surfaces.add("torus", host.read_surface(key).mesh, world_from_surface=host.placement(key))
     copy = next(name for name in names if name != "grip (links)")
-    session.remove(copy)
+    session.patches.remove(copy)
     contacts.publish(host, session, {"torus": key})
     assert {patch.name for patch in contacts.read_patches(host.stage)} == {"grip (links)"} == names - {copy}
     assert contacts.read_pairs(host.stage) == ()
@@ -258,7 +258,7 @@ def test_three_hundred_steps_of_core_host_and_strangers_agree() -> None:
     host, session, key = torus_host()
     session.close()
     session = Session(host=host, discover=False)
-    session.meshes["torus"] = host.read_surface(key).mesh
+    session.surfaces.meshes["torus"] = host.read_surface(key).mesh
     rng = np.random.default_rng(7)
     texts = [host.layer.ExportToString()]
     at, last = 0, ""
@@ -274,7 +274,7 @@ def test_three_hundred_steps_of_core_host_and_strangers_agree() -> None:
                 at = 0
         else:
             if what == "command":
-                session.rotate("grip (links)", float(rng.uniform(-1, 1)))
+                session.patches.rotate("grip (links)", float(rng.uniform(-1, 1)))
             else:
                 with Usd.EditContext(host.stage, host.layer):
                     shift = Gf.Matrix4d(1.0).SetTranslate((float(number), 0.0, 0.0))

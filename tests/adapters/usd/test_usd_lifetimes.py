@@ -79,7 +79,7 @@ def test_a_host_that_nobody_holds_is_gone_with_its_files(scene: Path) -> None:
 
 def test_a_session_that_is_closed_lets_its_host_go(scene: Path) -> None:
     session = Session(host=UsdHost(scene), discover=False)
-    session.add_surface("ball", session.host.read_surface(BALL).mesh)
+    session.surfaces.add("ball", session.host.read_surface(BALL).mesh)
     seen = weakref.ref(session.host)
     session.close()
     assert seen() is None and open_files(scene.parent) == []
@@ -102,9 +102,9 @@ def test_a_file_that_changed_is_read_anew(scene: Path) -> None:
 def test_a_shot_lets_its_files_go(scene: Path) -> None:
     with Session(host=UsdHost(scene), discover=False) as session:
         mesh = session.host.read_surface(BALL).mesh
-        session.add_surface("ball", mesh, world_from_surface=session.host.placement(BALL))
+        session.surfaces.add("ball", mesh, world_from_surface=session.host.placement(BALL))
         points = SurfacePoints.at_vertices(mesh, [0, 1, 2])
-        session.paint("tip", points, surface="ball", axis=points[[0, 1]])
+        session.patches.paint("tip", points, surface="ball", axis=points[[0, 1]])
         document = session.document
     out = scene.with_name("out.usda")
     assert transfer(document, scene, {}, out)["surfaces"] == {"ball": BALL}

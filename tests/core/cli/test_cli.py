@@ -228,11 +228,11 @@ def edited(path: Path) -> None:
     """A document with one painted patch that was then renamed."""
     mesh = meshes.plane(4)
     with Session.open(path, discover=False) as session:
-        session.add_surface("sheet", mesh)
+        session.surfaces.add("sheet", mesh)
         points = SurfacePoints.at_vertices(mesh, [6, 7, 8, 12])
-        session.paint("first", points, surface="sheet", axis=points[[0, 2]])
+        session.patches.paint("first", points, surface="sheet", axis=points[[0, 2]])
         session.save()
-        session.rename("first", "second")
+        session.patches.rename("first", "second")
         session.save()
 
 

@@ -34,20 +34,22 @@ def test_transfer_onto_the_same_scan_is_the_identity(assets: Path, name: str) ->
     centres = mesh.points[mesh.faces].mean(axis=1)
     random = np.random.default_rng(1)
     session = Session(discover=False)
-    session.add_surface("scan", mesh)
+    session.surfaces.add("scan", mesh)
     for number in range(3):
         centre = centres[random.integers(len(centres))]
         near = np.flatnonzero(np.linalg.norm(centres - centre, axis=1) < 0.06 * mesh.bounding_box_diagonal)
         points = SurfacePoints(random.choice(near, 150), random.dirichlet(np.ones(3), 150))
         patch = f"p{number}"
         try:
-            session.paint(patch, points, surface="scan", axis=points[[0, 50, 100]])
+            session.patches.paint(patch, points, surface="scan", axis=points[[0, 50, 100]])
         except Exception as error:  # near a place that is not manifold a sentence is the right answer
             assert "manifold" in str(error) or "connected" in str(error) or "reach" in str(error), error
             continue
-        root = session.root(patch)
-        session.transfer(patch, "scan", root.point(), heading=root.heading, name=f"{patch} again", mirrored=False)
+        root = session.geometry.root(patch)
+        session.patches.transfer(
+            patch, "scan", root.point(), heading=root.heading, name=f"{patch} again", mirrored=False
+        )
         for copy in (patch, f"{patch} again"):
-            moved = np.linalg.norm(session.points(copy).positions(mesh) - points.positions(mesh), axis=1)
+            moved = np.linalg.norm(session.geometry.points(copy).positions(mesh) - points.positions(mesh), axis=1)
             assert moved.max() <= 1e-9 * mesh.bounding_box_diagonal
     assert session.document.patches, "no patch of three could be painted"

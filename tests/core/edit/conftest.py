@@ -33,9 +33,9 @@ def session() -> Session:
     """Surfaces "torus" (in cm) and "sphere" (in m); patches palm, thumb, tip on the torus."""
     session = Session(discover=False)
     torus, sphere = cached_family("torus"), cached_family("sphere")
-    session.add_surface("torus", torus, meters_per_unit=0.01)
-    session.add_surface("sphere", sphere.with_points(0.01 * sphere.points))
+    session.surfaces.add("torus", torus, meters_per_unit=0.01)
+    session.surfaces.add("sphere", sphere.with_points(0.01 * sphere.points))
     for number, (name, face) in enumerate([("palm", 100), ("thumb", 140), ("tip", 180)]):
         points = disk(torus, face, 25, 0.09, number)
-        session.paint(name, points, surface="torus", axis=on_the_line(points, torus))
+        session.patches.paint(name, points, surface="torus", axis=on_the_line(points, torus))
     return session

@@ -24,65 +24,65 @@ GOAL = SurfacePoints([50], [[0.2, 0.3, 0.5]])
 
 
 def where(session: Session, patch: str) -> FloatArray:
-    return session.points(patch).positions(session.mesh_of(patch))
+    return session.geometry.points(patch).positions(session.geometry.mesh_of(patch))
 
 
 def test_what_hung_on_a_merged_patch_hangs_on_the_one_that_it_became_part_of(session: Session) -> None:
-    session.link("tip", "thumb", parent_point=1, own_point=1)
+    session.patches.link("tip", "thumb", parent_point=1, own_point=1)
     before = where(session, "tip")
-    session.merge("palm", ["thumb"])
+    session.patches.merge("palm", ["thumb"])
     link = session.document.patch("tip").placement
     assert isinstance(link, Link) and link.parent == "palm" and link.own_point == 1
     assert np.allclose(where(session, "tip"), before, atol=1e-12)
-    session.rotate("palm", 0.4)
+    session.patches.rotate("palm", 0.4)
     assert not np.allclose(where(session, "tip"), before)
 
 
 @pytest.mark.parametrize("order", [("palm", "thumb", "tip"), ("thumb", "tip", "palm"), ("tip", "palm", "thumb")])
 def test_patches_that_hang_on_one_another_merge_without_moving(session: Session, order: tuple[str, ...]) -> None:
     """The first hangs on the second, the second on the third, or the other way round: no cycle, nothing lost."""
-    session.paint("ring", SurfacePoints([220, 221, 222], np.eye(3)), surface="torus", axis=GOAL, heading=1j)
-    session.link("tip", "thumb")
-    session.link("thumb", "palm")
-    session.link("ring", "tip", own_point=0)
+    session.patches.paint("ring", SurfacePoints([220, 221, 222], np.eye(3)), surface="torus", axis=GOAL, heading=1j)
+    session.patches.link("tip", "thumb")
+    session.patches.link("thumb", "palm")
+    session.patches.link("ring", "tip", own_point=0)
     names = ("palm", "thumb", "tip")
     before = {tuple(p) for name in names for p in np.round(where(session, name), 9)}
     ring = where(session, "ring")
     first, *others = order
-    session.merge(first, others)
+    session.patches.merge(first, others)
     assert list(session.document.patches) == [name for name in (*names, "ring") if name not in others]
     assert list(inconsistencies(session.document)) == []
     assert {tuple(p) for p in np.round(where(session, first), 9)} == before
     assert np.allclose(where(session, "ring"), ring, atol=1e-11)
     assert isinstance(session.document.patch(first).placement, Root)
     session.undo()
-    session.merge(first, others[:1])
+    session.patches.merge(first, others[:1])
     assert list(inconsistencies(session.document)) == []
 
 
 def test_weights_of_merged_patches_are_areas_in_one_unit(session: Session) -> None:
     """A copy remembers the units that it was painted in; weights are areas, so they go by the square."""
-    session.transfer("palm", "sphere", GOAL, heading=1.0, name="copy")
-    session.detach("copy")
+    session.patches.transfer("palm", "sphere", GOAL, heading=1.0, name="copy")
+    session.patches.detach("copy")
     sphere = cached_family("sphere")
     points = SurfacePoints([200, 201, 202, 203], np.full((4, 3), 1 / 3))
-    session.paint("own", points, surface="sphere", axis=points[[0, 3]])
+    session.patches.paint("own", points, surface="sphere", axis=points[[0, 3]])
     shapes = [session.document.shape_of(name) for name in ("own", "copy")]
     areas = [shape.weights.sum() * shape.meters_per_unit**2 for shape in shapes]
     assert shapes[0].meters_per_unit != shapes[1].meters_per_unit and len(sphere.faces) > 203
-    session.merge("own", ["copy"])
+    session.patches.merge("own", ["copy"])
     merged = session.document.shape_of("own")
     assert merged.weights.sum() * merged.meters_per_unit**2 == pytest.approx(sum(areas))
 
 
 def test_places_that_merged_patches_share_are_kept_once(session: Session) -> None:
-    count = len(session.points("palm"))
-    session.transfer("palm", "torus", session.root("palm").point(), heading=session.root("palm").heading,
-                     name="twin", mirrored=False)  # fmt: skip
-    session.detach("twin")
-    session.paint("twin", session.points("thumb")[:3])
-    session.merge("palm", ["twin"])
-    assert len(session.points("palm")) == count + 3
+    count = len(session.geometry.points("palm"))
+    root = session.geometry.root("palm")
+    session.patches.transfer("palm", "torus", root.point(), heading=root.heading, name="twin", mirrored=False)
+    session.patches.detach("twin")
+    session.patches.paint("twin", session.geometry.points("thumb")[:3])
+    session.patches.merge("palm", ["twin"])
+    assert len(session.geometry.points("palm")) == count + 3
 
 
 def test_a_tree_may_be_deeper_than_calls_may_nest(session: Session) -> None:
@@ -92,7 +92,7 @@ def test_a_tree_may_be_deeper_than_calls_may_nest(session: Session) -> None:
         session.do(Transfer((replace(source, name=f"c{number}", original=False, placement=link),)))
     deepest = where(session, f"c{depth - 1}")
     computed = session.derived.computed
-    session.rotate("palm", 0.5)
+    session.patches.rotate("palm", 0.5)
     moved = where(session, f"c{depth - 1}")
     assert not np.allclose(moved, deepest)
     assert session.derived.computed - computed == depth + 2  # each axis once, and the points
@@ -102,14 +102,14 @@ def test_a_tree_may_be_deeper_than_calls_may_nest(session: Session) -> None:
 def test_imported_groups_and_pairs_keep_apart_under_names_that_are_taken(session: Session) -> None:
     """A set with "g" and "g.2" into a document with "g": what "g" becomes is not what "g.2" is."""
     for name, patch in (("g", "palm"), ("g.2", "thumb")):
-        session.group(name, [patch])
-    session.transfer("palm", "sphere", GOAL, heading=1.0, name="copy")
+        session.patches.group(name, [patch])
+    session.patches.transfer("palm", "sphere", GOAL, heading=1.0, name="copy")
     for name in ("p", "p.2"):
-        session.pair("palm", "copy", name=name)
-    found = session.contact_set("both")
-    session.ungroup("g.2")
-    session.unpair("p.2")
-    names = session.import_set(found)
+        session.pairs.add("palm", "copy", name=name)
+    found = session.sets.of("both")
+    session.patches.ungroup("g.2")
+    session.pairs.remove("p.2")
+    names = session.sets.read(found)
     assert len(session.document.groups) == 3 and len(session.document.pairs) == 3
     members = [patches for group, patches in session.document.groups.items() if group != "g"]
     assert sorted(members) == sorted([(names["palm"],), (names["thumb"],)])
@@ -117,17 +117,22 @@ def test_imported_groups_and_pairs_keep_apart_under_names_that_are_taken(session
 
 def test_a_rebound_surface_leaves_trees_on_other_surfaces_in_place(session: Session) -> None:
     """The axis of a copy elsewhere gets as many points as that of its original has on the new mesh: one, here."""
-    session.transfer("palm", "sphere", GOAL, heading=1.0, name="parent")
-    session.transfer("tip", "sphere", SurfacePoints([60], [[0.2, 0.3, 0.5]]), heading=1.0, name="child")
-    ends = (len(session.axis("parent")) - 1, len(session.axis("child")) - 1)
-    session.link("child", "parent", parent_point=ends[0], own_point=ends[1])
-    roots = {name: session.root(name).point().positions(session.mesh("sphere")) for name in ("parent", "child")}
+    session.patches.transfer("palm", "sphere", GOAL, heading=1.0, name="parent")
+    session.patches.transfer("tip", "sphere", SurfacePoints([60], [[0.2, 0.3, 0.5]]), heading=1.0, name="child")
+    ends = (len(session.geometry.axis("parent")) - 1, len(session.geometry.axis("child")) - 1)
+    session.patches.link("child", "parent", parent_point=ends[0], own_point=ends[1])
+    roots = {
+        name: session.geometry.root(name).point().positions(session.geometry.mesh("sphere"))
+        for name in ("parent", "child")
+    }
     far_away = meshes.plane(2, 1.0)
-    session.rebind("torus", far_away.with_points(far_away.points - 50.0))
+    session.surfaces.rebind("torus", far_away.with_points(far_away.points - 50.0))
     assert session.document.shape_of("palm").axis.point_count <= ends[0]
     assert list(inconsistencies(session.document)) == []
     for name, root in roots.items():
-        assert np.allclose(session.root(name).point().positions(session.mesh("sphere")), root, atol=1e-12)
+        assert np.allclose(
+            session.geometry.root(name).point().positions(session.geometry.mesh("sphere")), root, atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("levels", [MAX_DEPTH, MAX_DEPTH + 1, 400])

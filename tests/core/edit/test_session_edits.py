@@ -46,7 +46,7 @@ def test_nothing_but_the_stroke_edits_while_a_stroke_is_under_way(plain: Session
     """Not even within a macro, whose commands would come before the drag that began earlier."""
     with plain.macro("outer"):
         with plain.stroke() as stroke:
-            stroke.set_extra("drag", 1)
+            stroke.do(SetExtra("drag", 1))
             for act in (lambda: plain.set_extra("other", 1), plain.undo, plain.stroke().__enter__):
                 with pytest.raises(CommandRejected, match="stroke is under way"):
                     act()
@@ -62,10 +62,10 @@ def test_a_drag_that_cannot_be_committed_is_taken_off_the_screen(tmp_path: Path,
     if not kept:
         session._file._journal._broken = "the disk is full."  # type: ignore[union-attr]
         with pytest.raises(FileRefused, match="disk is full"), session.stroke() as stroke:
-            stroke.set_extra("drag", 1)
+            stroke.do(SetExtra("drag", 1))
     else:
         with session.stroke() as stroke:
-            stroke.set_extra("drag", 1)
+            stroke.do(SetExtra("drag", 1))
     assert told[-1].after is session.document
     assert [change.kind for change in told] == ["preview", "do" if kept else "preview"]
     assert ("drag" in session.document.extras) == kept
@@ -89,11 +89,11 @@ def test_listeners_that_edit_leave_nobody_with_an_older_document(plain: Session)
 
 def test_who_is_told_of_a_surface_can_ask_for_its_mesh(plain: Session) -> None:
     got: list[TriangleMesh] = []
-    plain.listen(lambda change: got.append(plain.mesh("torus")))
+    plain.listen(lambda change: got.append(plain.geometry.mesh("torus")))
     torus = cached_family("torus")
-    plain.add_surface("torus", torus)
+    plain.surfaces.add("torus", torus)
     stretched = torus.with_points(torus.points * 1.5)
-    plain.add_surface("torus", stretched)
+    plain.surfaces.add("torus", stretched)
     assert got == [torus, stretched]
 
 
@@ -107,7 +107,7 @@ def test_plugins_hear_of_the_first_commit_though_nobody_asked_for_plugins() -> N
 
     session = Session(plugins=[Hears()], discover=False)
     with session.stroke() as stroke:
-        stroke.set_extra("a", 1)
+        stroke.do(SetExtra("a", 1))
     session.undo()
     assert Hears.told == [(1, "user"), (0, "user")]
 
@@ -118,7 +118,7 @@ def test_a_host_asked_to_undo_during_a_drag_is_not_asked() -> None:
     session = Session(host=host, discover=False)
     session.set_extra("a", 1)
     with session.stroke() as stroke:
-        stroke.set_extra("drag", 1)
+        stroke.do(SetExtra("drag", 1))
         for act in (session.undo, session.redo):
             with pytest.raises(CommandRejected, match="stroke is under way"):
                 act()
@@ -135,11 +135,11 @@ def test_a_host_that_undoes_by_itself_during_a_drag_ends_the_drag(known: bool) -
         session.close()
         session = Session(host=host, discover=False)
     with session.stroke() as stroke:
-        stroke.set_extra("drag", 1)
+        stroke.do(SetExtra("drag", 1))
         assert host.undo()
         assert extras(session) == {}
         with pytest.raises(CommandRejected, match="stroke is over"):
-            stroke.set_extra("drag", 2)
+            stroke.do(SetExtra("drag", 2))
     assert extras(session) == {}
     assert host.redo() and extras(session) == {"a": 1}
     with pytest.raises(CommandRejected, match="host went to another document"), session.macro("Arrange"):
@@ -196,7 +196,7 @@ def test_a_second_thread_is_refused_while_the_first_edits(plain: Session, inside
         dispose()
     else:
         with getattr(plain, inside)(*["Arrange"][: inside == "macro"]) as editor:
-            editor.set_extra("b", 1)
+            editor.do(SetExtra("b", 1))
             run_other()
     assert extras(plain) == {"a": 1, "b": 1}
     assert len(answers) == 3 and all("one thread at a time" in answer for answer in answers)
@@ -232,4 +232,4 @@ def test_a_drag_sees_the_pose_that_the_session_sees(session: Session) -> None:
     """What touches is asked of the posed skin, within a stroke as without."""
     with session.stroke() as stroke:
         assert stroke.rigs is session.rigs
-        assert stroke.posed_mesh.__func__ is session.posed_mesh.__func__  # type: ignore[attr-defined]
+        assert type(stroke.geometry) is type(session.geometry)

@@ -60,8 +60,8 @@ class Bare:
 def session(engine: object = None, **arguments: object) -> Session:
     """A session on a bumpy ball and a flat sheet."""
     made = Session(engine=engine, discover=False, **arguments)  # type: ignore[arg-type]
-    made.add_surface("ball", meshes.noisy(3, 0.02))
-    made.add_surface("sheet", meshes.plane(12))
+    made.surfaces.add("ball", meshes.noisy(3, 0.02))
+    made.surfaces.add("sheet", meshes.plane(12))
     return made
 
 
@@ -71,12 +71,12 @@ def paint(edited: Session, name: str = "patch") -> SurfacePoints:
     vertices = SurfacePoints.at_vertices(ball, np.arange(len(ball.points)))
     middle = SurfacePoints.at_vertices(ball, 40)
     painted = vertices[log_map(ball, middle, vertices).distance < 0.5]
-    edited.paint(name, painted, surface="ball", axis=middle, heading=1.0)
+    edited.patches.paint(name, painted, surface="ball", axis=middle, heading=1.0)
     return painted
 
 
 def positions(edited: Session, name: str) -> FloatArray:
-    return edited.points(name).positions(edited.mesh_of(name))
+    return edited.geometry.points(name).positions(edited.geometry.mesh_of(name))
 
 
 def test_painting_asks_the_engine_and_what_follows_does_not() -> None:
@@ -86,9 +86,10 @@ def test_painting_asks_the_engine_and_what_follows_does_not() -> None:
     assert engine.queries == 1
     for each in (edited, usual):
         middle = SurfacePoints.at_vertices(meshes.plane(12), 6 * 13 + 6)
-        each.rotate("patch", 0.3)
-        each.transfer("patch", "sheet", middle, direction=[1.0, 0.0, 0.0], name="copy")
-        each.undo(), each.redo()
+        each.patches.rotate("patch", 0.3)
+        each.patches.transfer("patch", "sheet", middle, direction=[1.0, 0.0, 0.0], name="copy")
+        each.undo()
+        each.redo()
     assert engine.queries == 1
     for name in ("patch", "copy"):
         assert np.array_equal(positions(edited, name), positions(usual, name))
@@ -108,7 +109,7 @@ def test_what_an_engine_measures_reaches_the_patch_and_its_transfers() -> None:
     middle = SurfacePoints.at_vertices(meshes.plane(12), 6 * 13 + 6)
     for each in (edited, usual):
         paint(each)
-        each.transfer("patch", "sheet", middle, direction=[1.0, 0.0, 0.0], name="copy")
+        each.patches.transfer("patch", "sheet", middle, direction=[1.0, 0.0, 0.0], name="copy")
     centre = middle.positions(meshes.plane(12))[0]
     half, whole = (np.linalg.norm(positions(each, "copy") - centre, axis=1) for each in (edited, usual))
     assert half == pytest.approx(0.5 * whole, abs=1e-9)
@@ -135,7 +136,7 @@ def test_an_engine_is_selected_by_name(tmp_path: Path) -> None:
         told = positions(edited, "patch")
         edited.save(tmp_path / "hand.json")
     with Session.open(tmp_path / "hand.json", discover=False) as later:  # a session that does not know the engine
-        later.add_surface("ball", meshes.noisy(3, 0.02))
+        later.surfaces.add("ball", meshes.noisy(3, 0.02))
         assert np.array_equal(positions(later, "patch"), told)
     with pytest.raises(InvalidInput, match="no geodesic engine 'straigt'; there are: straight"):
         session("straigt", plugins=[Plugin()])

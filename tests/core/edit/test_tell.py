@@ -29,11 +29,11 @@ def test_a_diff_is_empty_exactly_when_documents_are_equal(seed: int) -> None:
 
 def test_edits_are_told_in_words(session: Session) -> None:
     before = session.document
-    session.rotate("palm", 0.5)
-    session.bend("palm", 1, 0.2)
-    session.scale("thumb", along=0.8)
-    session.link("tip", "thumb")
-    session.recolor("tip", (0.0, 0.0, 0.0))
+    session.patches.rotate("palm", 0.5)
+    session.patches.bend("palm", 1, 0.2)
+    session.patches.scale("thumb", along=0.8)
+    session.patches.link("tip", "thumb")
+    session.patches.recolor("tip", (0.0, 0.0, 0.0))
     assert list(changes(before, session.document)) == [
         "patch palm: rotated by +28.6 degrees",
         "patch palm: bent by +11.5 degrees at axis point 1",

@@ -90,16 +90,16 @@ def test_a_session_poses_what_only_the_host_can_evaluate() -> None:
     ball = TriangleMesh(0.2 * small.points + [0.6, 0.5, 0.1], small.faces)
     scene.add(Asset("ball", ball, meters_per_unit=1.0))
     with Session(host=scene, objects=None, discover=False) as session:
-        arm = session.mesh(name)
+        arm = session.geometry.mesh(name)
         tip = int(np.argmax(arm.points[:, 1] + arm.points[:, 0]))
         near = np.argsort(np.linalg.norm(arm.points - arm.points[tip], axis=1))[:6]
         points = SurfacePoints.at_vertices(arm, near)
-        session.paint("tip", points, surface=name, axis=points[[0]], heading=1.0)
+        session.patches.paint("tip", points, surface=name, axis=points[[0]], heading=1.0)
         side = SurfacePoints.at_vertices(ball, [int(np.argmin(ball.points[:, 0]))])
-        session.pair("tip", session.transfer("tip", "ball", side, heading=1.0))
+        session.pairs.add("tip", session.patches.transfer("tip", "ball", side, heading=1.0))
         assert isinstance(session.problem().bodies[0].black_box, EvaluatedRig)
         before, rest = session.document, scene.read_pose(name)
-        (pair,) = session.pairs()
+        (pair,) = session.geometry.pairs()
 
         def gap() -> float:
             skin = arm.with_points(scene.skin_points(name, scene.read_pose(name)))

@@ -43,10 +43,10 @@ def test_three_hundred_steps_of_core_host_and_user_agree() -> None:
     key = host.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
     session = Session(host=host, discover=False)
     mesh = host.read_surface(key).mesh
-    session.add_surface("torus", mesh)
+    session.surfaces.add("torus", mesh)
     near = np.argsort(np.linalg.norm(mesh.points - mesh.points[0], axis=1), kind="stable")[:30]
     points = SurfacePoints.at_vertices(mesh, near)
-    session.paint("grip", points, surface="torus", axis=points[[0, 12]])
+    session.patches.paint("grip", points, surface="torus", axis=points[[0, 12]])
     rng = np.random.default_rng(11)
     scenes, at = [host.scene], 0
     for number in range(300):
@@ -59,7 +59,7 @@ def test_three_hundred_steps_of_core_host_and_user_agree() -> None:
             at = min(at + 1, len(scenes) - 1)
         elif what in ("command", "user"):
             if what == "command":
-                session.rotate("grip", float(rng.uniform(-1, 1)))
+                session.patches.rotate("grip", float(rng.uniform(-1, 1)))
             else:
                 host.move(key, affine(rng.uniform(-1, 1, 3), (1, 1, 1), rng.normal(size=3)))
             at += 1
@@ -217,9 +217,9 @@ def test_merging_commands_in_a_host_loses_no_step() -> None:
     host.add(Asset("torus", meshes.family("torus"), meters_per_unit=1.0))
     session = Session(host=host, discover=False)
     mesh = meshes.family("torus")
-    session.add_surface("torus", mesh)
+    session.surfaces.add("torus", mesh)
     points = SurfacePoints.at_vertices(mesh, np.arange(12))
-    session.paint("grip", points, surface="torus", axis=points[[0, 6]])
+    session.patches.paint("grip", points, surface="torus", axis=points[[0, 6]])
     for color in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
         session.do(Recolor(("grip",), color), merge=True)
     last = session.document

@@ -69,7 +69,7 @@ def test_the_demo_keeps_grasp() -> None:
 def test_the_thumb_opposes_the_fingers(name: str) -> None:
     """What makes a grip a grip: the surface under the thumb looks the other way than under the other contacts."""
     job = demo(name)
-    pairs = {pair.pair.name: pair.object_points for pair in job.session.pairs()}
+    pairs = {pair.pair.name: pair.object_points for pair in job.session.geometry.pairs()}
     normals = {name: points.normals(job.object.mesh).mean(axis=0) for name, points in pairs.items()}
     thumb = normals.pop("thumb_distal")
     others = np.mean(list(normals.values()), axis=0)
@@ -198,7 +198,7 @@ def test_explicit_roots_and_headings_are_used_as_given() -> None:
     for place in (by_direction, by_aim):
         first, *others = recipe.patches
         job = perform(replace(recipe, patches=(replace(first, place=place), *others)), plugins())
-        axis = job.session.axis(target(first.name)).points.positions(job.object.mesh)
+        axis = job.session.geometry.axis(target(first.name)).points.positions(job.object.mesh)
         assert np.linalg.norm(axis[0] - [0.03, 0.62, 0.0]) < 3e-3
         way = axis[-1] - axis[0]
         assert way[1] / np.linalg.norm(way) > 0.95

@@ -1,0 +1,206 @@
+"""The geometry of a document as it stands: where surfaces, patches, axes and pairs are. It never edits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, frozen
+from contact_core.contact.area import PatchArea, measure_area
+from contact_core.contact.axis import Axis
+from contact_core.contact.axis_generator import AxisRequest
+from contact_core.contact.distortion import Distortion, measure_distortion
+from contact_core.contact.pairing import correspond
+from contact_core.contact.patch import PatchPoints
+from contact_core.contact.placement import Root
+from contact_core.contact.proximity import patches_of_vertices, touching_vertices
+from contact_core.document.document import ContactDocument, ContactPair, named
+from contact_core.edit.derived import Derived
+from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tangent import direction_to_heading
+from contact_core.rig.bones import bones_of
+from contact_core.rig.rig import Rig, forward_kinematics, skin
+
+
+@dataclass(frozen=True, eq=False)
+class PairGeometry:
+    """One contact pair as a solver takes it: k points that are to touch k others.
+
+    manipulator_points on manipulator_surface, object_points on object_surface (names); weights: (k,), the point
+    weights times the weight of the pair, in square meters.
+    """
+
+    pair: ContactPair
+    manipulator_surface: str
+    object_surface: str
+    manipulator_points: SurfacePoints
+    object_points: SurfacePoints
+    weights: FloatArray
+
+
+class DocumentGeometry:
+    """Reads a document with its meshes and rigs.
+
+    document: returns the document to read, at every question. rigs: by surface. Names that the document does not
+    have raise InvalidInput, as do surfaces whose mesh was not brought.
+    """
+
+    def __init__(self, document: Callable[[], ContactDocument], derived: Derived, rigs: Mapping[str, Rig]) -> None:
+        self._current = document
+        self._derived = derived
+        self._rigs = rigs
+
+    @property
+    def document(self) -> ContactDocument:
+        """The document that is read."""
+        return self._current()
+
+    def of(self, document: ContactDocument) -> DocumentGeometry:
+        """The same for another document of these surfaces: a preview, a ghost, an earlier revision."""
+        return DocumentGeometry(lambda: document, self._derived, self._rigs)
+
+    # -- surfaces ------------------------------------------------------------------------------------------------
+
+    def mesh(self, surface: str) -> TriangleMesh:
+        """The mesh of a surface."""
+        return self._derived.mesh(self.document, surface)
+
+    def posed_mesh(self, surface: str) -> TriangleMesh:
+        """The surface in the pose that the document holds; at rest without one."""
+        pose, rig = self.document.poses.get(surface), self._rigs.get(surface)
+        if pose is None:
+            return self.mesh(surface)
+        if rig is None:
+            raise InvalidInput(f"the rig of {surface!r} is not loaded: give it to the session by surfaces.add.")
+        local = rig.rest_local.copy()
+        for joint, matrix in zip(pose.joints, pose.local, strict=True):
+            local[rig.joint_index(joint)] = matrix
+        return self.mesh(surface).with_points(skin(rig, forward_kinematics(rig.parents, local)))
+
+    def touching(
+        self, surface: str, other: str, distance: float, *, facing: bool = True, smallest: int = 3
+    ) -> list[SurfacePoints]:
+        """Vertices of a surface in its pose within `distance` (its own units) of another, part by part.
+
+        What to paint when a coarse pose came first (workflow (e) of the paper). facing: nothing reaches through
+        the far wall of a cup. smallest: parts of fewer vertices are left out.
+        """
+        here, there = self.document.surface(surface), self.document.surface(other)
+        ratio = here.meters_per_unit / there.meters_per_unit
+        scale = np.diag([ratio, ratio, ratio, 1.0])
+        move = np.linalg.inv(there.world_from_surface) @ scale @ here.world_from_surface
+        vertices, _ = touching_vertices(
+            self.posed_mesh(surface), self.mesh(other), distance * ratio, other_from_posed=move, facing=facing
+        )
+        mesh = self.mesh(surface)
+        return [SurfacePoints.at_vertices(mesh, part) for part in patches_of_vertices(mesh, vertices, smallest)]
+
+    def root_at(
+        self, surface: str, point: SurfacePoints, heading: complex | None = None, direction: Any = None
+    ) -> Root:
+        """A root from one surface point and either a heading or a direction in surface space (3,)."""
+        if (heading is None) == (direction is None):
+            raise InvalidInput("a root needs either a heading or a direction in space.")
+        self.check_points(surface, point)
+        if heading is None:
+            wanted = frozen(direction, np.float64, (3,), "a direction in space")[None]
+            heading = complex(direction_to_heading(self.mesh(surface), point, wanted)[0])
+        return Root.at(point, heading)
+
+    def check_points(self, surface: str, points: SurfacePoints) -> None:
+        """There are points, and all of them lie on the mesh of a surface. Raises InvalidInput."""
+        count = len(self.mesh(surface).faces)
+        if not len(points):
+            raise InvalidInput(f"a surface point or several were wanted on {surface!r}, but none came.")
+        outside = (points.faces < 0) | (points.faces >= count)  # (k,)
+        if outside.any():
+            bad = int(points.faces[np.argmax(outside)])
+            raise InvalidInput(f"{surface!r} has the faces 0..{count - 1}, but a point in face {bad} came.")
+
+    def axis_request(self, surface: str, patch: str, points: SurfacePoints) -> AxisRequest:
+        """What an axis generator gets for a patch: bones of the rig, and the axes drawn on the surface so far."""
+        others = {
+            other.name: self.axis(other.name).points
+            for other in self.document.patches.values()
+            if other.surface == surface and other.name != patch and other.original
+        }
+        rig = self._rigs.get(surface)
+        bones, owner = bones_of(rig, points) if rig is not None else (None, None)
+        return AxisRequest(self.mesh(surface), points, bones, owner, others)
+
+    # -- patches -------------------------------------------------------------------------------------------------
+
+    def mesh_of(self, patch: str) -> TriangleMesh:
+        """The mesh that a patch lies on."""
+        return self.mesh(self.document.patch(patch).surface)
+
+    def axis(self, patch: str) -> Axis:
+        """The axis of a patch where it is now."""
+        return self._derived.axis(self.document, patch)
+
+    def root(self, patch: str) -> Root:
+        """Where the axis of a patch starts now, whether it is the child of another or not."""
+        return self._derived.root(self.document, patch)
+
+    def unit(self, patch: str) -> float:
+        """Surface units of a patch's surface per unit of its shape."""
+        return self._derived.unit(self.document, patch)
+
+    def reconstruction(self, patch: str) -> PatchPoints:
+        """The points of a patch where they are now, with what ran off a boundary."""
+        return self._derived.patch(self.document, patch)
+
+    def points(self, patch: str) -> SurfacePoints:
+        """The points of a patch where they are now."""
+        return self.reconstruction(patch).points
+
+    def area(self, patch: str) -> PatchArea:
+        """The patch triangulated: area on its surface, boundary loops."""
+        positions = self.points(patch).positions(self.mesh_of(patch))
+        return measure_area(self.document.shape_of(patch), positions)
+
+    def distortion(self, patch: str, other: str) -> Distortion:
+        """How a patch that shares its shape with another is stretched against it."""
+        here, there = self.document.patch(patch), self.document.patch(other)
+        if here.shape != there.shape:
+            raise CommandRejected(
+                f"{patch!r} and {other!r} do not share a shape, so no point of one is a point of the other."
+            )
+        mesh, mesh_there = self.mesh_of(patch), self.mesh_of(other)
+        points, points_there = self.points(patch), self.points(other)
+        ratio = self.document.surface(there.surface).meters_per_unit
+        ratio /= self.document.surface(here.surface).meters_per_unit
+        return measure_distortion(
+            self.area(patch).triangles,
+            points.positions(mesh),
+            points.normals(mesh),
+            points_there.positions(mesh_there) * ratio,
+            points_there.normals(mesh_there),
+            mirrored=here.mirrored != there.mirrored,
+        )
+
+    # -- pairs ---------------------------------------------------------------------------------------------------
+
+    def pairs(self) -> tuple[PairGeometry, ...]:
+        """Every pair with its points, in the order of the document."""
+        return tuple(self.pair(name) for name in self.document.pairs)
+
+    def pair(self, name: str) -> PairGeometry:
+        """One pair with its points: as many on either side, those that ran off a boundary with weight 0."""
+        pair = named(self.document.pairs, name, "pair")
+        ends = [self.document.patch(end) for end in (pair.manipulator, pair.object)]
+        here, there = (self.reconstruction(end.name) for end in ends)
+        shape = self.document.shapes[ends[0].shape]
+        other = np.arange(len(shape))
+        if ends[0].shape != ends[1].shape:
+            other = correspond(shape, self.document.shapes[ends[1].shape])
+        fits = ~(here.ran_off | there.ran_off[other])  # (k,)
+        weights = shape.weights * shape.meters_per_unit**2 * pair.weight * fits
+        return PairGeometry(
+            pair, ends[0].surface, ends[1].surface, here.points, there.points[other], weights
+        )  # fmt: skip

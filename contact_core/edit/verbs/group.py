@@ -1,0 +1,100 @@
+"""What every group of verbs has at hand, and how each finds out what a command has to hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import IntArray, frozen
+from contact_core.contact.axis import Axis, reconstruct_axis
+from contact_core.contact.linkage import link_to
+from contact_core.contact.patch import parameterize_patch
+from contact_core.contact.placement import Link, Placement, Root
+from contact_core.contact.shape import PatchCoordinates
+from contact_core.document.document import ContactDocument
+from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.edit.editor import Editor
+from contact_core.errors import InvalidInput
+from contact_core.geometry.surface_point import SurfacePoints
+
+
+class VerbGroup:
+    """Verbs of an editor: each measures on its geometry, makes a command, and gives the editor that command."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+
+    @property
+    def _document(self) -> ContactDocument:
+        return self._editor.document
+
+    @property
+    def _geometry(self) -> DocumentGeometry:
+        return self._editor.geometry
+
+    def _measured(self, patch: str, points: SurfacePoints, anchors: IntArray | None = None) -> PatchCoordinates:
+        """Coordinates of points relative to the axis of a patch as it lies now, as they are before its scaling and
+        mirroring. anchors: as for `parameterize_patch`."""
+        return parameterize_patch(
+            self._geometry.mesh_of(patch),
+            self._geometry.axis(patch),
+            points,
+            anchors=anchors,
+            shape=self._document.effective_axis(patch),
+            mirrored=self._document.patch(patch).mirrored,
+            unit=self._geometry.unit(patch),
+            engine=self._editor.derived.engine,
+        )
+
+    def _check_axis_point(self, patch: str, point: int) -> None:
+        """A patch has this axis point. Raises InvalidInput."""
+        count = self._document.shape_of(patch).axis.point_count
+        if not 0 <= point < count:
+            raise InvalidInput(f"the axis of {patch!r} has the points 0..{count - 1}, but {point} came.")
+
+    def _point_indices(self, patch: str, indices: Any) -> IntArray:
+        """(k,) rising, each once, of points that the patch has, k >= 1. Raises InvalidInput for any other."""
+        count = len(self._document.shape_of(patch))
+        if np.asarray(indices).dtype == bool:
+            raise InvalidInput("point indices are whole numbers, but a mask came: pass numpy.flatnonzero(mask).")
+        chosen = np.unique(frozen(indices, np.int64, (None,), "point indices"))
+        if not len(chosen):
+            raise InvalidInput(f"indices of points of {patch!r} were wanted, but none came.")
+        if not 0 <= chosen[0] <= chosen[-1] < count:
+            bad = int(chosen[0] if chosen[0] < 0 else chosen[-1])
+            raise InvalidInput(f"{patch!r} has the points 0..{count - 1}, but {bad} came.")
+        return chosen
+
+    def _relinked(self, child: str, link: Link, point: SurfacePoints, tangent: complex) -> Link:
+        """The link that puts the child's linked axis point at `point` with `tangent` there."""
+        return link_to(
+            self._geometry.mesh_of(child),
+            link.parent,
+            self._geometry.axis(link.parent),
+            point,
+            tangent,
+            parent_point=link.parent_point,
+            own_point=link.own_point,
+        )
+
+    def _placement_at(self, patch: str, root: Root) -> Placement:
+        """The placement of the patch's own kind that puts its first axis point at `root`."""
+        link = self._document.patch(patch).placement
+        if not isinstance(link, Link):
+            return root
+        if link.own_point == 0:
+            return self._relinked(patch, link, root.point(), root.heading)
+        axis = self._axis_from(patch, root)
+        point = axis.points[link.own_point]
+        return self._relinked(patch, link, point, complex(axis.tangents[link.own_point]))
+
+    def _axis_from(self, patch: str, root: Root) -> Axis:
+        """The axis that the patch would have at another root."""
+        return reconstruct_axis(
+            self._geometry.mesh_of(patch),
+            self._document.effective_axis(patch),
+            root,
+            mirrored=self._document.patch(patch).mirrored,
+            unit=self._geometry.unit(patch),
+        )
