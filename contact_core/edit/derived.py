@@ -7,7 +7,7 @@ was there, and equal patches share it.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from typing import TypeVar, cast
 
@@ -29,28 +29,35 @@ class Derived:
 
     computed: how many axes and point sets were traced so far; tests guard the cost by counting. engine: measures
     the coordinates of points on their patches; what is reconstructed here is walked by the exact tracer alone.
+    known_meshes: by content digest, those of earlier revisions among them.
     """
 
-    def __init__(self, engine: GeodesicEngine = EXACT) -> None:
+    def __init__(
+        self, engine: GeodesicEngine = EXACT, known_meshes: Mapping[str, TriangleMesh] | None = None
+    ) -> None:
         self.engine = engine
-        self._meshes: dict[str, TriangleMesh] = {}  # by content digest: after a rebind, undo finds the old one
+        self.known_meshes = dict(known_meshes or {})  # after a rebind, undo finds the old one
         self._kept: OrderedDict[Hashable, tuple[object, int]] = OrderedDict()
         self._points = 0
         self.computed = 0
 
+    def apart(self) -> Derived:
+        """The same meshes and engine with a cache of its own, for another thread."""
+        return Derived(self.engine, self.known_meshes)
+
     def bring(self, mesh: TriangleMesh) -> None:
         """Know a mesh from now on, for every surface of every document that has its content."""
-        self._meshes[mesh.digest] = mesh
+        self.known_meshes[mesh.digest] = mesh
 
     def meshes(self, document: ContactDocument) -> dict[str, TriangleMesh]:
         """The meshes that were brought, by the names of their surfaces in a document."""
-        known = self._meshes
+        known = self.known_meshes
         return {s.name: known[s.digest] for s in document.surfaces.values() if s.digest in known}
 
     def mesh(self, document: ContactDocument, surface: str) -> TriangleMesh:
         """The mesh of a surface. Raises InvalidInput where the session was not given it."""
         try:
-            return self._meshes[document.surface(surface).digest]
+            return self.known_meshes[document.surface(surface).digest]
         except KeyError:
             raise InvalidInput(
                 f"the mesh of {surface!r} is not loaded: give it to the session by surfaces.add({surface!r}, mesh)."

@@ -10,6 +10,7 @@ import numpy as np
 
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
+from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import Handle, handle_under
 from contact_core.interaction.seen import Hit, SeenScene
@@ -59,14 +60,14 @@ class Desk:
         return self.ghost or self.session.document
 
     @property
-    def shown(self) -> Draft:
-        """A reader of the shown document with its geometry: axes, roots, points."""
-        return Draft(self.document, self.session.derived, self.session.rigs)
+    def shown(self) -> DocumentGeometry:
+        """The geometry of the shown document: axes, roots, points."""
+        return self.session.geometry.of(self.document)
 
     def follow(self) -> frozenset[str]:
         """Bring the scene to the shown document; returns the surfaces that moved."""
         before = self.scene
-        self.scene = before.following(self.document, self.session.known_meshes, self.session.rigs)
+        self.scene = before.following(self.document, self.session.derived.known_meshes, self.session.rigs)
         return self.scene.moved_since(before)
 
     def pick(self, pointer: Pointer, among: Iterable[str] | None = None) -> Hit | None:
@@ -140,7 +141,7 @@ class Desk:
 
     def preview(self, title: str, gathered: Together) -> None:
         """Preview what was gathered as one step. Raises CommandRejected."""
-        self.stroke.submit(Macro(title, tuple(gathered.commands)))
+        self.stroke.do(Macro(title, tuple(gathered.commands)))
 
     def commit(self) -> None:
         """End the stroke with what it previews, as one step of the session; nothing where it previews nothing."""
@@ -171,9 +172,9 @@ class Together(Draft):
         super().__init__(document, derived, rigs)
         self.commands: list[Command] = []
 
-    def submit(self, command: Command, *, origin: str = "user") -> int:
+    def do(self, command: Command, *, origin: str = "user") -> None:
+        super().do(command, origin=origin)
         self.commands.append(command)
-        return super().submit(command, origin=origin)
 
 
 def _spacing(at: Any) -> float:

@@ -25,7 +25,7 @@ def _chosen(desk: Desk) -> tuple[str, ...]:
 
 def remove(desk: Desk) -> None:
     """Remove the selected patches; what hangs on them stays."""
-    desk.session.remove(*_chosen(desk))
+    desk.session.patches.remove(*_chosen(desk))
 
 
 def clear(desk: Desk) -> None:
@@ -39,12 +39,12 @@ def mirror(desk: Desk) -> None:
     """Turn the selected patches into their mirror images."""
     with desk.session.macro("Mirror " + ", ".join(_chosen(desk))):
         for patch in _chosen(desk):
-            desk.session.mirror(patch)
+            desk.session.patches.mirror(patch)
 
 
 def detach(desk: Desk) -> None:
     """Give the active patch a shape of its own."""
-    desk.session.detach(_chosen(desk)[-1])
+    desk.session.patches.detach(_chosen(desk)[-1])
 
 
 def unlink(desk: Desk) -> None:
@@ -55,7 +55,7 @@ def unlink(desk: Desk) -> None:
         raise CommandRejected("none of the selected patches hangs on another.")
     with desk.session.macro("Unlink " + ", ".join(linked)):
         for patch in linked:
-            desk.session.unlink(patch)
+            desk.session.patches.unlink(patch)
 
 
 def unpair(desk: Desk) -> None:
@@ -70,7 +70,7 @@ def unpair(desk: Desk) -> None:
 
 def default_axis(desk: Desk) -> None:
     """Lay the axis of the active patch anew, by the default generator."""
-    desk.session.set_axis(_chosen(desk)[-1])
+    desk.session.patches.set_axis(_chosen(desk)[-1])
 
 
 def rest(desk: Desk) -> None:
@@ -80,7 +80,7 @@ def rest(desk: Desk) -> None:
         raise CommandRejected("every hand is at rest already.")
     with desk.session.macro("Rest pose"):
         for surface in posed:
-            desk.session.clear_pose(surface)
+            desk.session.surfaces.clear_pose(surface)
 
 
 def other_surface(desk: Desk) -> None:

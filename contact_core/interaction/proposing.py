@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from contact_core.document.document import ContactDocument
-from contact_core.edit.derived import Derived
 from contact_core.errors import CommandRejected
 from contact_core.interaction.overlay import Ghost, Overlay
 from contact_core.interaction.work import Worker
@@ -74,13 +73,12 @@ class Proposing:
             terms += (session.plugins.make(POSE_TERMS, name, weight=settings.penetration_weight),)
         poses = dict(session.document.poses)
         objective = Objective(terms) if settings.prior == "rest" else Objective(terms, prior=poses)
-        start, known, rigs = session.document, dict(session.known_meshes), dict(session.rigs)
+        start, derived, rigs = session.document, session.derived.apart(), dict(session.rigs)
         read = session.binding.read(start)  # as the scene has it; the host is asked here and not on the thread
         solver = settings.solver
-        engine = session.derived.engine
 
         def work(progress: Progress) -> Proposal:
-            draft = Draft(read, Derived(known, engine), rigs)
+            draft = Draft(read, derived, rigs)
             return find(start, draft, SolveSettings(solver, objective=objective, progress=progress))
 
         self._worker.begin(title, work, self.show)
@@ -119,7 +117,7 @@ class Proposing:
         if self.proposal is None:
             return Overlay()
         session, desk = self._desk.session, self._desk
-        before = desk.scene.following(session.document, session.known_meshes, session.rigs)
+        before = desk.scene.following(session.document, session.derived.known_meshes, session.rigs)
         moved = before.moved_since(desk.scene) & before.surfaces.keys()
         return Overlay(ghosts=tuple(
             Ghost(before.surfaces[name].points, before.surfaces[name].mesh.faces, _GHOST) for name in sorted(moved)
