@@ -15,9 +15,26 @@ import numpy as np
 from contact_core.arrays import FloatArray, frozen
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.transform import transform_points
 
 ScreenToRays = Callable[[FloatArray], tuple[FloatArray, FloatArray]]  # (k, 2) -> origins (k, 3), directions (k, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """A surface that may hide what is painted on. mesh: in any space. mesh_from_rays: (4, 4) takes the space of a
+    gesture's rays there, affine; so its tree serves wherever it stands."""
+
+    mesh: TriangleMesh
+    mesh_from_rays: FloatArray
+
+    def distances(self, origins: FloatArray, directions: FloatArray) -> FloatArray:
+        """(k,) along rays (k, 3) of the gesture's space to the surface, inf where they miss."""
+        move = self.mesh_from_rays
+        cast = Locator.of(self.mesh).cast(transform_points(move, origins), directions @ move[:3, :3].T)
+        return cast.distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +46,7 @@ class BrushGesture:
     rays in surface space. A gesture drawn on the screen may leave its path empty: `contact_core.contact.pointer`
     then finds what the pointer passed over. seen: the same faces where the artist sees them, when the surface is
     posed (`mesh.with_points(posed)`; keep it over a stroke, it holds the tree that rays ask), in the space of the
-    rays; None: as at rest. before: other surfaces in that space, which hide what lies behind them. radius,
+    rays; None: as at rest. before: other surfaces in that space, or screens, which hide what lies behind. radius,
     spacing: surface units; 0 leaves the choice to the brush. seed: for brushes that sample; equal gestures give
     equal points. Raises InvalidInput where `seen` has other faces.
     """
@@ -42,7 +59,7 @@ class BrushGesture:
     rays: ScreenToRays | None = None
     seed: int = 0
     seen: TriangleMesh | None = None
-    before: tuple[TriangleMesh, ...] = ()
+    before: tuple[TriangleMesh | Screen, ...] = ()
 
     def __post_init__(self) -> None:
         if self.seen is None or self.seen.faces is self.mesh.faces:

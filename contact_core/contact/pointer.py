@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray, IntArray, frozen
-from contact_core.contact.brush import BrushGesture
+from contact_core.contact.brush import BrushGesture, Screen
 from contact_core.errors import InvalidInput
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
@@ -64,7 +64,8 @@ def met(gesture: BrushGesture, screen: FloatArray) -> Met:
     hits = Locator.of(seen).cast(origins, directions)
     hit = hits.found
     for other in gesture.before:
-        hit = hit & (hits.distance <= Locator.of(other).cast(origins, directions).distance)
+        hides = other if isinstance(other, Screen) else Screen(other, np.eye(4))
+        hit = hit & (hits.distance <= hides.distances(origins, directions))
     points = SurfacePoints(
         np.where(hit, hits.points.faces, 0), np.where(hit[:, None], hits.points.barycentric, [1.0, 0.0, 0.0])
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,8 @@ class Desk:
     """See the module. Tools read everything; of the document they change only what `stroke` previews.
 
     view: of the event that is handled. ghost: a proposal's document, which is shown in place of the session's.
-    pins: terms that the live solve adds while a gesture lasts. settled: whether the gesture itself has posed the
+    pins: terms that pull on hands while a gesture lasts: the pose that follows is the edit. Such a term names its
+    `bodies`. held: joints that do not follow meanwhile. settled: whether the gesture itself has posed the
     hand, so that no solve follows it.
     """
 
@@ -43,6 +45,7 @@ class Desk:
         self.scene = SeenScene({}, meters_per_unit)
         self.ghost: ContactDocument | None = None
         self.pins: tuple[PoseTerm, ...] = ()
+        self.held: tuple[str, ...] = ()
         self.settled = False
         self._stack: contextlib.ExitStack | None = None
         self._stroke: Stroke | None = None
@@ -91,6 +94,13 @@ class Desk:
                 best, name = float(away.min()), patch.name
         return name
 
+    def take(self, patch: str) -> None:
+        """Make a patch the active one: the only one selected, unless it is selected among others."""
+        others = tuple(name for name in self.selection.patches if name != patch)
+        kept = others if patch in self.selection.patches else ()
+        if self.selection.patches != (*kept, patch):
+            self.selection = replace(self.selection, patches=(*kept, patch))
+
     def handle_at(self, pointer: Pointer, handles: Iterable[Handle]) -> Handle | None:
         """The handle that a press here takes."""
         return handle_under(tuple(handles), self.view, pointer.pixel)
@@ -135,6 +145,11 @@ class Desk:
         """What the stroke would commit now."""
         return None if self._stroke is None else self._stroke.command
 
+    def preview_nothing(self) -> None:
+        """Show the document of the press again: a drag that came back is nothing."""
+        if self._stroke is not None and self._stroke.command is not None:
+            self._stroke.cancel()
+
     def together(self) -> Together:
         """An editor that gathers several verbs, from the document at the press, for `preview`."""
         return Together(self.stroke.document, self.session.derived, self.session.rigs)
@@ -161,7 +176,7 @@ class Desk:
         self.commit()
 
     def _over(self) -> None:
-        self._stroke, self.pins, self.settled = None, (), False
+        self._stroke, self.pins, self.held, self.settled = None, (), (), False
         self.follow()
 
 

@@ -11,6 +11,7 @@ from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import SetPose
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
+from contact_core.proposals.draft import Draft
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, poses_of, problem_of
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
@@ -34,23 +35,25 @@ class LiveSolve:
         self._last = self._start
         self._seen: tuple[object, ...] = self._asked_of(desk.document)
         self._done: Command | None = None
+        self._pinned: tuple[PoseTerm, ...] = ()
         self.milliseconds, self.solves = 0.0, 0
 
     @property
     def is_due(self) -> bool:
         """Whether the gesture previews something that no solve has followed yet."""
         desk = self._desk
-        return desk.settings.live and not desk.settled and desk.command not in (None, self._done)
+        follows = desk.settings.live and not desk.settled and desk.command not in (None, self._done)
+        return follows or (bool(desk.pins) and desk.pins is not self._pinned)
 
     def follow(self) -> bool:
         """Solve for what is previewed, and preview the pose with it; whether there was anything to solve.
 
         Raises InvalidInput for settings and plugins that do not fit the problem.
         """
-        command = self._desk.command
-        if command is None or not self.is_due:
+        if not self.is_due:
             return False
-        self._done = command
+        edit = None if self._desk.command is self._done else self._desk.command
+        self._done, self._pinned = self._desk.command, self._desk.pins
         asked = self._asked_of(self._desk.document)
         if _same(asked, self._seen) and self._last is self._start:
             return False  # nothing that a pair sees has changed
@@ -61,8 +64,9 @@ class LiveSolve:
             return False
         self._last = {**self._last, **poses}
         posing = tuple(SetPose(name, pose) for name, pose in poses.items())
-        self._done = Macro(command.label(), (command, *posing))
-        self._desk.stroke.do(self._done)
+        title = "Pose " + ", ".join(poses) if edit is None else edit.label()
+        self._done = Macro(title, (*(() if edit is None else (edit,)), *posing))
+        self._desk.stroke.submit(self._done)
         self.milliseconds, self.solves = 1e3 * (time.perf_counter() - began), self.solves + 1
         return True
 
@@ -72,7 +76,7 @@ class LiveSolve:
         asked: list[object] = [*document.pairs.values(), *document.surfaces.values(), *self._desk.pins]
         for pair in document.pairs.values():
             for end in (pair.manipulator, pair.object):
-                if document.surface(document.patch(end).surface).digest in derived.known_meshes:
+                if document.surface(document.patch(end).surface).digest in self._desk.session.known_meshes:
                     asked += [derived.patch(document, end), document.shape_of(end).weights]
         return tuple(asked)
 
@@ -90,10 +94,9 @@ class LiveSolve:
         pulled = tuple(name for name in _bodies(desk.pins) if name in rigs)
         if not document.pairs and not pulled:
             return None
+        draft = Draft(posed, desk.session.derived, rigs)
         objective = Objective(prior=self._prior(), bodies=pulled)
-        problem = problem_of(
-            desk.session.geometry.of(posed), rigs, objective, meters_per_unit=desk.scene.meters_per_unit
-        )
+        problem = problem_of(draft, rigs, objective, meters_per_unit=desk.scene.meters_per_unit)
         return replace(problem, terms=self._terms(problem), held=self._held(problem))
 
     def _prior(self) -> Literal["rest", "current"] | Mapping[str, Pose]:
@@ -111,7 +114,7 @@ class LiveSolve:
 
     def _held(self, problem: PoseProblem) -> dict[str, tuple[str, ...]]:
         """The joints that are held, by the bodies that have them."""
-        held = self._desk.settings.held
+        held = (*self._desk.settings.held, *self._desk.held)
         return {body.name: tuple(j for j in held if j in body.rig.joints) for body in problem.bodies}
 
     def _solver(self) -> PoseSolver:

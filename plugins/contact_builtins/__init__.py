@@ -82,6 +82,22 @@ def contact_hosts() -> list[object]:
 def contact_tools() -> list[object]:
     return [
         "contact_builtins.tools.select:Select",
+        "contact_builtins.tools.paint:Paint",
+        "contact_builtins.tools.paint:Erase",
+        "contact_builtins.tools.paint:LASSO",
+        "contact_builtins.tools.paint:CURVE",
+        "contact_builtins.tools.axis:DrawAxis",
+        "contact_builtins.tools.move:Move",
+        "contact_builtins.tools.move:Turn",
+        "contact_builtins.tools.reshape:Bend",
+        "contact_builtins.tools.reshape:Scale",
+        "contact_builtins.tools.transfer:Transfer",
+        "contact_builtins.tools.join:LinkPatches",
+        "contact_builtins.tools.join:PairPatches",
+        "contact_builtins.tools.reshape:Weigh",
+        "contact_builtins.tools.place:Place",
+        "contact_builtins.tools.pose:DragJoint",
+        "contact_builtins.tools.measure:Measure",
     ]
 
 

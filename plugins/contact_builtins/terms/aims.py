@@ -49,6 +49,11 @@ class PinTerm(HasSettings):
     weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "pin"
 
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The bodies that are pinned, each once: they take part in a solve though no pair names them."""
+        return tuple(dict.fromkeys(pin.body for pin in self.pins))
+
     def bind(self, problem: PoseProblem) -> BoundTerm:
         return _Pins(self, problem)
 

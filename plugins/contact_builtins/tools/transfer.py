@@ -1,0 +1,130 @@
+"""Transfer the active patch: press where its root goes, drag where its axis points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, TypeAlias
+
+import numpy as np
+
+from contact_builtins.tools.drag import Drag, patch_under
+from contact_builtins.tools.join import in_order
+from contact_builtins.tools.move import heading_to
+from contact_core.arrays import FloatArray
+from contact_core.errors import ContactError
+from contact_core.geometry.tangent import heading_to_direction
+from contact_core.interaction.desk import Desk, Together
+from contact_core.interaction.events import Pointer
+from contact_core.interaction.overlay import NOTHING, Ghost, Overlay
+from contact_core.interaction.seen import Hit
+from contact_core.interaction.tool import Gesture
+from contact_core.proposals.draft import Draft
+from contact_core.settings import HasSettings, setting
+
+Mirrored: TypeAlias = Literal["auto", "yes", "no"]
+
+
+@dataclass(frozen=True)
+class Transfer(HasSettings):
+    """A copy shares the shape: it follows what is done to its original. A press on a patch while none is active,
+    or with Ctrl, makes that the active one."""
+
+    name: ClassVar[str] = "transfer"
+    summary: ClassVar[str] = "copy the active patch to where you press, along where you drag"
+    key: ClassVar[str] = "T"
+    hint: ClassVar[str] = (
+        "press at the root, drag along the axis; Ctrl takes another patch, Shift mirrors the other way"
+    )
+    tree: bool = setting(True, help="what hangs on the patch is copied with it")
+    pair: bool = setting(True, help="a copy on another surface is paired with its original at once")
+    mirrored: Mirrored = setting("auto", help="as the mirror image; auto: on another surface, as contact wants it")
+
+    def hover(self, desk: Desk, pointer: Pointer) -> Overlay:
+        hit, source = self._target(desk, pointer), desk.selection.patch
+        if hit is None or source is None or pointer.holds("ctrl"):
+            return NOTHING
+        try:
+            return ghost_of(desk, self, source, hit, _along(desk, source, hit), pointer)
+        except ContactError:
+            return NOTHING
+
+    def press(self, desk: Desk, pointer: Pointer) -> Gesture | None:
+        source = desk.selection.patch
+        if source is None or pointer.holds("ctrl"):
+            found = patch_under(desk, pointer)
+            if found is None:
+                return None
+            desk.take(found[0])
+            return Gesture()
+        hit = self._target(desk, pointer)
+        return None if hit is None else Transferring(self, desk, pointer, source, hit)
+
+    def is_mirrored(self, desk: Desk, source: str, surface: str, pointer: Pointer) -> bool:
+        """Whether the copy is the mirror image."""
+        other = desk.document.patch(source).surface != surface
+        wanted = {"yes": True, "no": False, "auto": other}[self.mirrored]
+        return wanted != pointer.holds("shift")
+
+    def _target(self, desk: Desk, pointer: Pointer) -> Hit | None:
+        return desk.pick(pointer)
+
+
+class Transferring(Drag):
+    """hit: where the root goes. The copy is there from the press on; a drag of more than a few pixels turns it."""
+
+    def __init__(self, tool: Transfer, desk: Desk, pointer: Pointer, source: str, hit: Hit) -> None:
+        super().__init__(desk, pointer)
+        self.tool, self.source, self.root = tool, source, hit
+        self.default = _along(desk, source, hit)
+        self.copy = source
+        self.drag(pointer)
+
+    def move(self, pointer: Pointer) -> None:
+        self.drag(pointer)
+
+    def drag(self, pointer: Pointer) -> None:
+        far = float(np.linalg.norm(pointer.pixel - self.start.pixel)) > 6.0 * self.desk.view.pixel_ratio
+        end = self.hit(pointer, self.root.surface) if far else None
+        heading = None
+        if end is not None:
+            heading = heading_to(self.desk.shown.mesh(self.root.surface), self.root.point, end.point)
+        together = self.desk.together()
+        given: dict[str, Any] = {"direction": self.default} if heading is None else {"heading": heading}
+        names = together.transfer_tree(
+            self.source, self.root.surface, self.root.point, descendants=self.tool.tree,
+            mirrored=self.tool.is_mirrored(self.desk, self.source, self.root.surface, pointer), **given,
+        )  # fmt: skip
+        self.copy = names[self.source]
+        self.desk.preview(f"Transfer {self.source}", self._paired(together, names))
+
+    def _paired(self, together: Together, names: dict[str, str]) -> Together:
+        if self.tool.pair and self.desk.document.patch(self.source).surface != self.root.surface:
+            for name, copy in names.items():
+                together.pair(*in_order(together.document, name, copy))
+        return together
+
+    def hint(self) -> str:
+        return f"{self.copy}: drag along its axis"
+
+
+def _along(desk: Desk, source: str, hit: Hit) -> FloatArray:
+    """(3,) the direction of the source's axis as it is seen, in the space of the surface that was hit."""
+    here = desk.scene.surfaces[desk.document.patch(source).surface]
+    root = desk.shown.root(source)
+    direction = heading_to_direction(here.mesh, root.point(), np.array([root.heading]))[0]
+    there = desk.scene.surfaces[hit.surface]
+    return there.surface[:3, :3] @ here.world[:3, :3] @ direction
+
+
+def ghost_of(desk: Desk, tool: Transfer, source: str, hit: Hit, direction: FloatArray, pointer: Pointer) -> Overlay:
+    """The copies before they are made."""
+    draft = Draft(desk.document, desk.session.derived, desk.session.rigs)
+    mirrored = tool.is_mirrored(desk, source, hit.surface, pointer)
+    names = draft.transfer_tree(
+        source, hit.surface, hit.point, direction=direction, mirrored=mirrored, descendants=tool.tree
+    )
+    seen, ghosts = desk.scene.surfaces[hit.surface], []
+    for name, copy in names.items():
+        points = seen.positions(draft.points(copy))
+        ghosts.append(Ghost(points, np.zeros((0, 3), np.int64), desk.document.patch(name).color, 0.6))
+    return Overlay(ghosts=tuple(ghosts))
