@@ -11,7 +11,6 @@ from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import SetPose
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
-from contact_core.proposals.draft import Draft
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, poses_of, problem_of
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
@@ -66,7 +65,7 @@ class LiveSolve:
         posing = tuple(SetPose(name, pose) for name, pose in poses.items())
         title = "Pose " + ", ".join(poses) if edit is None else edit.label()
         self._done = Macro(title, (*(() if edit is None else (edit,)), *posing))
-        self._desk.stroke.submit(self._done)
+        self._desk.stroke.do(self._done)
         self.milliseconds, self.solves = 1e3 * (time.perf_counter() - began), self.solves + 1
         return True
 
@@ -76,7 +75,7 @@ class LiveSolve:
         asked: list[object] = [*document.pairs.values(), *document.surfaces.values(), *self._desk.pins]
         for pair in document.pairs.values():
             for end in (pair.manipulator, pair.object):
-                if document.surface(document.patch(end).surface).digest in self._desk.session.known_meshes:
+                if document.surface(document.patch(end).surface).digest in derived.known_meshes:
                     asked += [derived.patch(document, end), document.shape_of(end).weights]
         return tuple(asked)
 
@@ -94,9 +93,10 @@ class LiveSolve:
         pulled = tuple(name for name in _bodies(desk.pins) if name in rigs)
         if not document.pairs and not pulled:
             return None
-        draft = Draft(posed, desk.session.derived, rigs)
         objective = Objective(prior=self._prior(), bodies=pulled)
-        problem = problem_of(draft, rigs, objective, meters_per_unit=desk.scene.meters_per_unit)
+        problem = problem_of(
+            desk.session.geometry.of(posed), rigs, objective, meters_per_unit=desk.scene.meters_per_unit
+        )
         return replace(problem, terms=self._terms(problem), held=self._held(problem))
 
     def _prior(self) -> Literal["rest", "current"] | Mapping[str, Pose]:

@@ -95,7 +95,7 @@ def paired(**arguments: Any) -> Artist:
 def _artist(document: ContactDocument, arguments: dict[str, Any]) -> Artist:
     session = Session(document, **(arguments or {"plugins": _plugins()}))
     for name, mesh in _meshes().items():
-        session.add_surface(name, mesh, rig=_rig() if name == "hand" else None)
+        session.surfaces.add(name, mesh, rig=_rig() if name == "hand" else None)
     return Artist(session, Interaction(session))
 
 
@@ -117,22 +117,24 @@ def _meshes() -> dict[str, TriangleMesh]:
 @cache
 def _unpaired() -> ContactDocument:
     session, skin, ball = Session(plugins=_plugins()), _meshes()["hand"], _meshes()["ball"]
-    session.add_surface("hand", skin, rig=_rig(), meters_per_unit=0.25, world_from_surface=shifted(0.8, -4.0, 0.0))
-    session.add_surface("ball", ball, world_from_surface=shifted(-1.1, 0.0, 0.0))
+    session.surfaces.add("hand", skin, rig=_rig(), meters_per_unit=0.25, world_from_surface=shifted(0.8, -4.0, 0.0))
+    session.surfaces.add("ball", ball, world_from_surface=shifted(-1.1, 0.0, 0.0))
     top = (0.0, 0.0, 1.0)
-    session.paint("spot", block(ball, top), surface="ball", axis=ends(ball, (0.0, -0.3, 1.0), (0.0, 0.3, 1.0)))
+    session.patches.paint(
+        "spot", block(ball, top), surface="ball", axis=ends(ball, (0.0, -0.3, 1.0), (0.0, 0.3, 1.0))
+    )
     pad = block(skin, (7.1, 0.0, 0.5), 0.35)
-    session.paint("pad", pad, surface="hand", axis=ends(skin, (6.8, 0.0, 0.5), (7.5, 0.0, 0.5)))
+    session.patches.paint("pad", pad, surface="hand", axis=ends(skin, (6.8, 0.0, 0.5), (7.5, 0.0, 0.5)))
     return session.document
 
 
 @cache
 def _paired() -> ContactDocument:
     session = _artist(_unpaired(), {}).session
-    session.transfer(
+    session.patches.transfer(
         "pad", "ball", ends(_meshes()["ball"], (0.6, -0.3, 0.8)), direction=(0.0, 1.0, 0.0), name="copy"
     )
-    session.pair("pad", "copy")
+    session.pairs.add("pad", "copy")
     return session.document
 
 

@@ -65,7 +65,7 @@ class DrawingAxis(Drag):
         if (pointer.x, pointer.y) == (self.start.x, self.start.y):
             return
         self.drag(pointer)
-        self.desk.stroke.set_axis(self.patch, self.drawn())
+        self.desk.stroke.patches.set_axis(self.patch, self.drawn())
 
     def drawn(self) -> SurfacePoints:
         """The picks: the first and the last, and those between unless the axis goes straight."""

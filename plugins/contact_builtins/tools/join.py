@@ -69,12 +69,12 @@ class Linking(Joining):
             return
         if found is None:
             if isinstance(desk.document.patch(self.first).placement, Link):
-                desk.stroke.unlink(self.first)
+                desk.stroke.patches.unlink(self.first)
             return
         parent, hit = found
         seen = desk.scene.surfaces[hit.surface]
         away = np.linalg.norm(seen.positions(desk.shown.axis(parent).points) - hit.position, axis=1)
-        desk.stroke.link(self.first, parent, parent_point=int(away.argmin()))
+        desk.stroke.patches.link(self.first, parent, parent_point=int(away.argmin()))
 
 
 @dataclass(frozen=True)
@@ -108,11 +108,11 @@ class Pairing(Joining):
         both = {self.first, found[0]}
         there = [pair.name for pair in document.pairs.values() if {pair.manipulator, pair.object} == both]
         if there:
-            self.desk.stroke.unpair(there[0])
+            self.desk.stroke.pairs.remove(there[0])
             return
         if document.patch(self.first).surface == document.patch(found[0]).surface:
             raise CommandRejected("patches of two surfaces are paired, but both are on one: link them instead.")
-        self.desk.stroke.pair(*in_order(document, self.first, found[0]))
+        self.desk.stroke.pairs.add(*in_order(document, self.first, found[0]))
 
 
 def in_order(document: ContactDocument, first: str, second: str) -> tuple[str, str]:

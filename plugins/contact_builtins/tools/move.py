@@ -66,10 +66,10 @@ class Moving(Drag):
         if hit is None:
             return
         if self.grip is None:
-            self.desk.stroke.translate(self.patch, hit.point)
+            self.desk.stroke.patches.translate(self.patch, hit.point)
         else:
             root = self.grip.moved_to(hit.point)
-            self.desk.stroke.place(self.patch, root.point(), heading=root.heading)
+            self.desk.stroke.patches.place(self.patch, root.point(), heading=root.heading)
 
 
 class Grip:
@@ -130,7 +130,7 @@ class Turning(Drag):
             return
         angle = cmath.phase(heading / self.first)
         self.angle = self.step * round(angle / self.step) if pointer.holds("shift") else angle
-        self.desk.stroke.rotate(self.patch, self.angle)
+        self.desk.stroke.patches.rotate(self.patch, self.angle)
 
     def overlay(self) -> Overlay:
         return shown_handles(self.desk)

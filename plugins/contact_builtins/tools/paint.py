@@ -204,7 +204,7 @@ class Painting(Gesture):
     def _brushed(self, *gestures: BrushGesture) -> None:
         if self.is_new and self.brush.erases:
             raise CommandRejected("there is nothing to erase here.")
-        self.desk.stroke.brush(
+        self.desk.stroke.patches.brush(
             self.brush, self.patch, *gestures,
             surface=self.seen.name, generator=self.tool.generator, color=self.color if self.is_new else None,
         )  # fmt: skip

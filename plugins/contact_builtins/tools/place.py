@@ -92,7 +92,7 @@ class Placing(Drag):
         middle = self.unit * self.middle  # in units of the surface, as the document has it
         world[:3, 3] = turn @ (self.before[:3, 3] - middle) + middle + self.unit * shift
         world[:3, :3] = _orthonormal(world[:3, :3])
-        self.desk.stroke.place_surface(self.seen.name, world)
+        self.desk.stroke.surfaces.place(self.seen.name, world)
 
     def _in_view(self, pointer: Pointer) -> FloatArray:
         """In the plane of the view, or with Shift towards the eye and away."""

@@ -75,7 +75,7 @@ class Bending(Drag):
         self.angle = cmath.phase(heading / self.first)
         together = self.desk.together()
         for point, share in self.shares:
-            together.bend(self.patch, point, share * self.angle)
+            together.patches.bend(self.patch, point, share * self.angle)
         self.desk.preview(f"Bend {self.patch}", together)
 
     def overlay(self) -> Overlay:
@@ -135,7 +135,7 @@ class Scaling(Drag):
         axis = self.desk.stroke.document.effective_axis(self.patch)
         along = None if pointer.holds("ctrl") else self.factor * axis.along
         spread = None if pointer.holds("shift") and along is not None else self.factor * axis.spread
-        self.desk.stroke.scale(self.patch, along=along, spread=spread)
+        self.desk.stroke.patches.scale(self.patch, along=along, spread=spread)
 
     def hint(self) -> str:
         return f"{100 * self.factor:.0f} %"
@@ -172,7 +172,7 @@ class Weighing(Drag):
 
     def drag(self, pointer: Pointer) -> None:
         self.factor = 2.0 ** min(max((pointer.x - self.start.x) / self.doubling, -10.0), 10.0)
-        self.desk.stroke.weigh(self.patch, self.factor * self.weights)
+        self.desk.stroke.patches.weigh(self.patch, self.factor * self.weights)
 
     def hint(self) -> str:
         return f"weight times {self.factor:.2g}"

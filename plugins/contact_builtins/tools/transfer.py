@@ -90,7 +90,7 @@ class Transferring(Drag):
             heading = heading_to(self.desk.shown.mesh(self.root.surface), self.root.point, end.point)
         together = self.desk.together()
         given: dict[str, Any] = {"direction": self.default} if heading is None else {"heading": heading}
-        names = together.transfer_tree(
+        names = together.patches.transfer_tree(
             self.source, self.root.surface, self.root.point, descendants=self.tool.tree,
             mirrored=self.tool.is_mirrored(self.desk, self.source, self.root.surface, pointer), **given,
         )  # fmt: skip
@@ -100,7 +100,7 @@ class Transferring(Drag):
     def _paired(self, together: Together, names: dict[str, str]) -> Together:
         if self.tool.pair and self.desk.document.patch(self.source).surface != self.root.surface:
             for name, copy in names.items():
-                together.pair(*in_order(together.document, name, copy))
+                together.pairs.add(*in_order(together.document, name, copy))
         return together
 
     def hint(self) -> str:
@@ -120,11 +120,11 @@ def ghost_of(desk: Desk, tool: Transfer, source: str, hit: Hit, direction: Float
     """The copies before they are made."""
     draft = Draft(desk.document, desk.session.derived, desk.session.rigs)
     mirrored = tool.is_mirrored(desk, source, hit.surface, pointer)
-    names = draft.transfer_tree(
+    names = draft.patches.transfer_tree(
         source, hit.surface, hit.point, direction=direction, mirrored=mirrored, descendants=tool.tree
     )
     seen, ghosts = desk.scene.surfaces[hit.surface], []
     for name, copy in names.items():
-        points = seen.positions(draft.points(copy))
+        points = seen.positions(draft.geometry.points(copy))
         ghosts.append(Ghost(points, np.zeros((0, 3), np.int64), desk.document.patch(name).color, 0.6))
     return Overlay(ghosts=tuple(ghosts))

@@ -33,7 +33,7 @@ def same(first: ContactDocument, second: ContactDocument) -> bool:
 
 def on_spot(artist: Artist, point: int = 18) -> Any:
     """The pixel of a point of "spot" that is not its root."""
-    return artist.pixel("ball", artist.session.points("spot"))[point]
+    return artist.pixel("ball", artist.session.geometry.points("spot"))[point]
 
 
 def path(artist: Artist, tool: str) -> Any:
@@ -47,14 +47,14 @@ def path(artist: Artist, tool: str) -> Any:
         artist.hands.select("spot")
         return on_spot(artist) + 60.0 + SPOT
     if tool in ("link", "pair"):
-        other = artist.pixel("hand", artist.session.points("pad"))[12]
+        other = artist.pixel("hand", artist.session.geometry.points("pad"))[12]
         if tool == "link":
-            artist.session.transfer("spot", "ball", artist.point("ball", start + by(60.0, 50.0)),
+            artist.session.patches.transfer("spot", "ball", artist.point("ball", start + by(60.0, 50.0)),
                                     direction=(0.0, 1.0, 0.0), name="near", mirrored=False)  # fmt: skip
-            other = artist.pixel("ball", artist.session.points("near"))[12]
+            other = artist.pixel("ball", artist.session.geometry.points("near"))[12]
         return np.stack([start, 0.5 * (start + other), other])
     if tool == "joint":
-        return artist.pixel("hand", artist.session.points("pad"))[12] + SPOT
+        return artist.pixel("hand", artist.session.geometry.points("pad"))[12] + SPOT
     return start + SPOT
 
 
@@ -117,43 +117,43 @@ def test_a_press_beside_everything_is_the_cameras(tool: str) -> None:
 
 
 def heading(artist: Artist, start: SurfacePoints, end: SurfacePoints) -> complex:
-    leg = complex(log_map(artist.session.mesh("ball"), start, end).coordinates[0])
+    leg = complex(log_map(artist.session.geometry.mesh("ball"), start, end).coordinates[0])
     return leg / abs(leg)
 
 
 def moved_by_its_root(artist: Artist, pixels: Any) -> None:
-    artist.session.translate("spot", artist.point("ball", pixels[-1]))
+    artist.session.patches.translate("spot", artist.point("ball", pixels[-1]))
 
 
 def turned(artist: Artist, pixels: Any) -> None:
-    root = artist.session.root("spot").point()
+    root = artist.session.geometry.root("spot").point()
     first, last = (heading(artist, root, artist.point("ball", pixel)) for pixel in (pixels[0], pixels[-1]))
-    artist.session.rotate("spot", cmath.phase(last / first))
+    artist.session.patches.rotate("spot", cmath.phase(last / first))
 
 
 def scaled(artist: Artist, pixels: Any) -> None:
-    root = artist.pixel("ball", artist.session.root("spot").point())[0]
+    root = artist.pixel("ball", artist.session.geometry.root("spot").point())[0]
     first, last = (np.linalg.norm(pixel - root) for pixel in (pixels[0], pixels[-1]))
-    artist.session.scale("spot", along=last / first, spread=last / first)
+    artist.session.patches.scale("spot", along=last / first, spread=last / first)
 
 
 def weighed(artist: Artist, pixels: Any) -> None:
     factor = 2.0 ** ((pixels[-1] - pixels[0])[0] / 120.0)
-    artist.session.weigh("spot", factor * artist.session.document.shape_of("spot").weights)
+    artist.session.patches.weigh("spot", factor * artist.session.document.shape_of("spot").weights)
 
 
 def drawn(artist: Artist, pixels: Any) -> None:
     ends = [artist.point("ball", pixel) for pixel in (pixels[0], pixels[-1])]
-    artist.session.set_axis("spot", SurfacePoints.concatenate(ends))
+    artist.session.patches.set_axis("spot", SurfacePoints.concatenate(ends))
 
 
 def transferred(artist: Artist, pixels: Any) -> None:
     root, end = (artist.point("ball", pixel) for pixel in (pixels[0], pixels[-1]))
-    artist.session.transfer("spot", "ball", root, heading=heading(artist, root, end), mirrored=False)
+    artist.session.patches.transfer("spot", "ball", root, heading=heading(artist, root, end), mirrored=False)
 
 
 def joined(artist: Artist, pixels: Any) -> None:
-    artist.session.pair("pad", "spot")
+    artist.session.pairs.add("pad", "spot")
 
 
 def painted(artist: Artist, pixels: Any) -> None:
@@ -163,7 +163,7 @@ def painted(artist: Artist, pixels: Any) -> None:
         seen.rest, SurfacePoints.concatenate([]), radius=0.2, screen=pixels,
         rays=lambda at: seen.rays_of(artist.view, at), before=(Screen(hand.mesh, hand.surface @ seen.world),),
     )  # fmt: skip
-    artist.session.brush("disk", "spot", stroke)
+    artist.session.patches.brush("disk", "spot", stroke)
 
 
 VERBS: dict[str, Callable[[Artist, Any], None]] = {
@@ -195,7 +195,7 @@ def test_a_patch_held_by_its_root_is_translated() -> None:
     artist, other = ball_and_hand(), ball_and_hand()
     artist.hands.select("spot")
     artist.hands.take_up("move")
-    root = artist.pixel("ball", artist.session.root("spot").point())[0]
+    root = artist.pixel("ball", artist.session.geometry.root("spot").point())[0]
     artist.drag(*(root + SPOT))
     moved_by_its_root(other, root + SPOT)
     assert same(artist.session.document, other.session.document)
@@ -207,7 +207,7 @@ def test_the_point_that_was_grabbed_stays_under_the_pointer() -> None:
     held = on_spot(artist)
     artist.hands.take_up("move")
     artist.drag(held, held + by(20.0, -10.0), held + by(60.0, 20.0))
-    at = artist.pixel("ball", artist.session.points("spot"))[18]
+    at = artist.pixel("ball", artist.session.geometry.points("spot"))[18]
     assert np.linalg.norm(at - (held + by(60.0, 20.0))) < 1.0  # a pixel: the ball has flat faces
 
 
@@ -215,11 +215,11 @@ def test_a_bend_follows_the_pointer_and_is_spread() -> None:
     artist = ball_and_hand()
     artist.hands.select("spot")
     artist.hands.take_up("bend")
-    axis = artist.pixel("ball", artist.session.axis("spot").points)
+    axis = artist.pixel("ball", artist.session.geometry.axis("spot").points)
     before = artist.session.document.effective_axis("spot").turning_angles
     artist.drag(axis[-1], axis[-1] + by(-5.0, 2.0), axis[-1] + by(-25.0, 8.0))
     turned_by = artist.session.document.effective_axis("spot").turning_angles - before
-    after = artist.pixel("ball", artist.session.axis("spot").points)
+    after = artist.pixel("ball", artist.session.geometry.axis("spot").points)
     assert np.count_nonzero(turned_by) > 1 and (turned_by >= -1e-12).all(), turned_by
     assert np.linalg.norm(after[0] - axis[0]) < 1e-6  # the root stays
     assert (after[-1] - axis[-1])[0] < -10.0  # the end went with the pointer
@@ -229,7 +229,7 @@ def test_a_bend_follows_the_pointer_and_is_spread() -> None:
 
 
 def on_copy(artist: Artist) -> Any:
-    return artist.pixel("ball", artist.session.points("copy"))[3]
+    return artist.pixel("ball", artist.session.geometry.points("copy"))[3]
 
 
 def test_edit_and_pose_are_one_step() -> None:
@@ -298,21 +298,21 @@ def test_what_no_pair_sees_moves_no_hand() -> None:
 def test_a_fingertip_follows_the_pointer() -> None:
     artist = ball_and_hand()
     artist.hands.take_up("joint")
-    tip = artist.pixel("hand", artist.session.points("pad"))[12]
+    tip = artist.pixel("hand", artist.session.geometry.points("pad"))[12]
     for _ in range(3):
         artist.drag(tip, tip + by(-4.0, -10.0), tip + by(-10.0, -40.0))
-        tip = artist.pixel("hand", artist.session.points("pad"))[12]
+        tip = artist.pixel("hand", artist.session.geometry.points("pad"))[12]
     pose = artist.session.document.poses["hand"]
     assert pose is artist.hands.desk.scene.surfaces["hand"].pose
     first = ball_and_hand()
-    assert tip[1] < first.pixel("hand", first.session.points("pad"))[12][1] - 60.0
+    assert tip[1] < first.pixel("hand", first.session.geometry.points("pad"))[12][1] - 60.0
 
 
 def test_a_hand_that_is_placed_is_not_pulled_back() -> None:
     artist = paired()
     artist.hands.take_up("place")
     artist.hands.select(surface="hand")
-    artist.drag(*(artist.pixel("hand", artist.session.points("pad"))[12] + SPOT))
+    artist.drag(*(artist.pixel("hand", artist.session.geometry.points("pad"))[12] + SPOT))
     assert not artist.session.document.poses
     artist.hands.select(surface="ball")
     artist.drag(*(on_spot(artist) + SPOT))
@@ -327,13 +327,13 @@ def test_every_brush_paints(brush: str) -> None:
     artist = ball_and_hand()
     artist.hands.take_up("paint")
     artist.hands.configure(TOOLS, "paint", brush=brush, radius=0.25)
-    start, before = on_spot(artist), len(artist.session.points("spot"))
-    erases = artist.session.named_brush(brush).erases
+    start, before = on_spot(artist), len(artist.session.geometry.points("spot"))
+    erases = artist.session.makers.brush(brush).erases
     if not erases:
         start = start + by(10.0, 60.0)
         artist.hands.select("spot")
     artist.drag(*(start + (0.1 if erases else 30.0) * np.array([[0, 0], [0.5, -0.5], [1, 0], [1, 1], [0, 1]])))
-    after = len(artist.session.points("spot"))
+    after = len(artist.session.geometry.points("spot"))
     assert (after < before) if erases else (after > before), artist.hands.status
 
 
@@ -364,7 +364,7 @@ def test_contacts_are_reached_through_what_hides_them() -> None:
     artist = ball_and_hand()
     there = artist.session.document.surface("hand").world_from_surface.copy()
     there[:3, 3] = [-8.0, 0.0, 6.0]  # before the ball
-    artist.session.place_surface("hand", there)
+    artist.session.surfaces.place("hand", there)
     hit = artist.hands.desk.scene.pick(artist.view, on_spot(artist))
     assert hit is not None and hit.surface == "hand"
     artist.key("Tab")
@@ -380,16 +380,16 @@ def test_a_stroke_ends_where_another_surface_hides_it() -> None:
     artist = ball_and_hand()
     there = artist.session.document.surface("hand").world_from_surface.copy()
     there[:3, 3] = [-4.4, 0.0, 6.0]  # before the right half of the ball
-    artist.session.place_surface("hand", there)
+    artist.session.surfaces.place("hand", there)
     artist.hands.take_up("paint")
     artist.hands.configure(TOOLS, "paint", radius=0.1)
     y = artist.at((-1.1, 0.0, 1.0))[1] + 2.0
     left, right = artist.at((-1.8, 0.0, 0.7))[0], artist.at((-0.4, 0.0, 0.7))[0]
     artist.drag((left, y), (0.5 * (left + right), y), (right, y), held=("shift",))
-    x = artist.pixel("ball", artist.session.points("contact"))[:, 0]
+    x = artist.pixel("ball", artist.session.geometry.points("contact"))[:, 0]
     artist.hands.select(surface="ball")
     artist.drag((left, y), (0.5 * (left + right), y), (right, y), held=("shift",))
-    through = artist.pixel("ball", artist.session.points("contact.2"))[:, 0]
+    through = artist.pixel("ball", artist.session.geometry.points("contact.2"))[:, 0]
     assert x.max() < 0.6 * right + 0.4 * left and through.max() > 0.9 * right
 
 
@@ -397,7 +397,7 @@ def test_another_hand_undoes_in_the_middle_of_a_drag() -> None:
     """A host's own undo ends the gesture, and its document stands."""
     artist = ball_and_hand()
     artist.hands.take_up("move")
-    artist.session.rename("pad", "palm")
+    artist.session.patches.rename("pad", "palm")
     earlier = artist.session.revision - 1
     artist.press(on_spot(artist))
     artist.move(on_spot(artist) + SPOT[2])
