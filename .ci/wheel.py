@@ -17,13 +17,14 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = {  # import name -> folder in the repository
     "contact_core": ROOT / "contact_core",
     "contact_builtins": ROOT / "plugins" / "contact_builtins",
+    "contact_gallery": ROOT / "plugins" / "contact_gallery",
     "contact_usd": ROOT / "adapters" / "usd" / "contact_usd",
     "contact_viewer": ROOT / "adapters" / "viewer" / "contact_viewer",
     "contact_blender": ROOT / "adapters" / "blender" / "contact_blender",
 }
 
 USE = """
-import sys, contact_core, contact_builtins, contact_usd, contact_viewer, contact_blender
+import sys, contact_core, contact_builtins, contact_gallery, contact_usd, contact_viewer, contact_blender
 for name in {packages!r}:
     place = sys.modules[name].__file__ or list(sys.modules[name].__path__)[0]
     assert "site-packages" in place, f"{{name}} comes from {{place}}"

@@ -4,7 +4,7 @@
 
 First a strip along a bent, tapered tentacle is transferred onto a pole, by three models: the axis model of this
 package; one log map from a single point (Lakshmipathy et al. 2022); and the boundary alone, traced as a closed
-chain, its interior filled (Lakshmipathy et al. 2021). The two others are small references from the paper's words.
+chain (Lakshmipathy et al. 2021). The two others are in `contact_gallery.other_models`.
 Then the axis model with axes that are too sparse, off the patch, outside it, and across a mismatch of curvature.
 """
 
@@ -22,22 +22,20 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.harness import record
 from contact_core.arrays import ComplexArray, FloatArray
 from contact_core.contact.area import measure_area
-from contact_core.contact.axis import Axis, draw_axis, reconstruct_axis
+from contact_core.contact.axis import Axis, draw_axis
 from contact_core.contact.distortion import Distortion, measure_distortion
-from contact_core.contact.linkage import follow_link, link_to
 from contact_core.contact.patch import PatchPoints, parameterize_patch, reconstruct_patch
 from contact_core.contact.placement import Root
 from contact_core.contact.shape import PatchShape
-from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading
-from contact_core.geometry.tracing import trace_chains
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import RENDERERS
 from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing import meshes
+from contact_gallery.other_models import boundary_alone, single_point
 
 POLE_RADIUS = 0.25
 ROWS: dict[str, str] = {}  # what is recorded, in order
@@ -127,7 +125,7 @@ def compare_models() -> list[Picture]:
         root = pole_root(pole, np.radians(degrees))
         ours = reconstruct_patch(pole, patch.shape, root, mirrored=True)
         print_row(f"{degrees:d} deg", "axis", patch.distortion(pole, ours.points), f"{int(ours.ran_off.sum())} off")
-        single = single_point(patch, pole, ours)
+        single = single_point(patch.mesh, patch.points, patch.axis, pole, ours.axis)
         print_row(f"{degrees:d} deg", "single-point log map", patch.distortion(pole, single), "")
         if degrees == 30:
             for title, there in (("axis", ours.points), ("single-point log map", single)):
@@ -138,30 +136,13 @@ def compare_models() -> list[Picture]:
     return pictures
 
 
-def single_point(patch: Patch, target: TriangleMesh, placed: PatchPoints) -> SurfacePoints:
-    """One log map from the middle of the patch, traced from where the axis model puts that middle."""
-    middle = len(patch.axis) // 2
-    log = log_map(patch.mesh, patch.axis.points[middle], patch.points)
-    n = len(patch.points)
-    legs = np.conj(log.first_leg / patch.axis.tangents[middle]) * placed.axis.tangents[middle]
-    starts = placed.axis.points[np.full(n, middle)]
-    return trace_chains(target, starts, legs, log.offsets, -log.turning_angles, log.lengths).points
-
-
-def boundary_model(patch: Patch, target: TriangleMesh, placed: PatchPoints) -> tuple[float, int, float]:
-    """The boundary loop as a chain of lengths and turns: closing gap over length, self-crossings, area ratio.
-
-    The loop starts where the axis model puts its first point, and in the same direction.
-    """
-    area = measure_area(patch.shape, patch.points.positions(patch.mesh))
-    loop = max(area.boundary, key=len)
-    shape, drawn = draw_axis(patch.mesh, patch.points[[*loop, loop[0]]], dense=False)
-    way = link_to(patch.mesh, "axis", patch.axis, drawn.points[0], complex(drawn.tangents[0]))
-    point, tangent, _ = follow_link(target, placed.axis, way.mirrored())
-    traced = reconstruct_axis(target, shape, Root.at(point, tangent), mirrored=True)
-    where = traced.points.positions(target)
+def boundary_model(patch: Patch, pole: TriangleMesh, placed: PatchPoints) -> tuple[float, int, float]:
+    """The boundary loop on the pole: closing gap over length, self-crossings, area ratio."""
+    traced, length = boundary_alone(patch.mesh, patch.points, patch.axis, patch.shape, pole, placed.axis)
+    where = traced.points.positions(pole)
     flat = POLE_RADIUS * np.unwrap(np.arctan2(where[:, 1], where[:, 0])) + 1j * where[:, 2]
-    gap = float(np.linalg.norm(where[-1] - where[0])) / shape.length
+    gap = float(np.linalg.norm(where[-1] - where[0])) / length
+    area = measure_area(patch.shape, patch.points.positions(patch.mesh))
     return gap, crossings(flat), abs(polygon_area(flat)) / area.area
 
 

@@ -23,6 +23,7 @@ class Picture:
     """All that a renderer needs, in world space: meshes, coloured points, line segments, camera, caption.
 
     focus: (k, 3) what has to be in the frame; all meshes by default. table and legend stand above the scene.
+    lettering: height of the caption's letters, times the usual.
     """
 
     meshes: tuple[PictureMesh, ...]
@@ -34,3 +35,4 @@ class Picture:
     table: tuple[tuple[str, str, bool], ...] = ()  # name, value, failed
     focus: FloatArray | None = None
     legend: tuple[tuple[str, tuple[float, float, float]], ...] = ()  # name, colour
+    lettering: float = 1.0

@@ -127,6 +127,7 @@ def contact_samples() -> list[object]:
         "contact_builtins.samples.catalogue:MUG",
         "contact_builtins.samples.catalogue:BASEBALL",
         "contact_builtins.samples.catalogue:SCISSORS",
+        "contact_builtins.samples.catalogue:RABBIT",
         "contact_builtins.samples.catalogue:POLE",
         "contact_builtins.samples.catalogue:CHAIR",
         "contact_builtins.samples.catalogue:FLOOR",
@@ -138,4 +139,5 @@ def contact_cli() -> list[object]:
     return [
         "contact_builtins.cli.inspect:Inspect",
         "contact_builtins.cli.demo:Demo",
+        "contact_gallery.command:GalleryCommand",
     ]

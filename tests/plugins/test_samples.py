@@ -22,7 +22,7 @@ GENUS = {"mug": 1, "scissors": 2, "chair": 7}  # all others: 0
 EXTENT = {  # longest side in metres, from and to
     "human_hand": (0.18, 0.22), "witch_hand": (0.24, 0.32), "alien_hand": (0.2, 0.26), "tentacle": (0.55, 0.65),
     "human_body": (1.7, 1.8), "mug": (0.1, 0.13), "baseball": (0.072, 0.076), "scissors": (0.17, 0.21),
-    "pole": (1.1, 1.3), "chair": (0.8, 1.0), "floor": (2.9, 3.1),
+    "pole": (1.1, 1.3), "rabbit": (0.2, 0.24), "chair": (0.8, 1.0), "floor": (2.9, 3.1),
 }  # fmt: skip
 HANDS = ("human_hand", "witch_hand", "alien_hand")
 MANIPULATORS = tuple(sample.name for sample in ALL if sample.kind == "manipulator")

@@ -110,8 +110,8 @@ def _write(plotter: Any, picture: Picture, pixels: int, width: int) -> None:
     """The table from the top left, the legend to its right, the caption along the bottom."""
     size, line = _type(pixels)
 
-    def say(text: str, x: float, y: float, ink: Any) -> None:
-        said = plotter.add_text(text, position=(x, y), font_size=size / 2, color=ink, font="arial")
+    def say(text: str, x: float, y: float, ink: Any, larger: float = 1.0) -> None:
+        said = plotter.add_text(text, position=(x, y), font_size=larger * size / 2, color=ink, font="arial")
         said.prop.background_color, said.prop.background_opacity = _TOP, 0.6  # a pole may stand behind it
 
     for place, (name, value, failed) in enumerate(picture.table):
@@ -126,7 +126,7 @@ def _write(plotter: Any, picture: Picture, pixels: int, width: int) -> None:
         y = pixels - (place + 1.4) * line
         say(name, left + 1.6 * size, y, _INK)
     if picture.caption:
-        say(picture.caption, size, 0.5 * line, _INK)
+        say(picture.caption, size, 0.5 * line, _INK, picture.lettering)
 
 
 def _type(pixels: int) -> tuple[float, float]:

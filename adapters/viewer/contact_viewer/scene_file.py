@@ -40,6 +40,7 @@ def write_scene(path: Path, pictures: Sequence[Picture], size: tuple[int, int]) 
             "caption": picture.caption,
             "table": picture.table,
             "legend": picture.legend,
+            "lettering": picture.lettering,
             "focus": None if picture.focus is None else keep(picture.focus),
         }
         for picture in pictures
@@ -71,6 +72,7 @@ def read_scene(path: Path) -> tuple[list[Picture], tuple[int, int]]:
                 table=tuple((name, value, bool(failed)) for name, value, failed in one["table"]),
                 legend=tuple((name, tuple(color)) for name, color in one["legend"]),
                 focus=None if one["focus"] is None else stored[one["focus"]],
+                lettering=one["lettering"],
             )
             for one in scene["pictures"]
         ]

@@ -180,7 +180,8 @@ def _write_text(image: FloatArray, picture: Picture) -> None:
         if color is not None:
             image[y + scale : y + 7 * scale, left : left + 6 * scale] = color
         _stamp(image, name, left + 9 * scale, y, scale, _INK)
-    _stamp(image, picture.caption, 8, image.shape[0] - int(1.3 * line), scale, _INK)
+    larger = max(1, round(scale * picture.lettering))
+    _stamp(image, picture.caption, 8, image.shape[0] - int(1.3 * line * larger / scale), larger, _INK)
 
 
 def _stamp(image: FloatArray, text: str, x: int, y: int, scale: int, ink: FloatArray) -> None:

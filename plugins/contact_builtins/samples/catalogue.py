@@ -74,7 +74,21 @@ HUMAN_BODY = GeneratedSample(
 MUG = GeneratedSample("mug", "object", "a mug with a handle (genus 1)", "mug:build")
 BASEBALL = GeneratedSample("baseball", "object", "a baseball with its seam", "baseball:build")
 SCISSORS = GeneratedSample("scissors", "object", "closed scissors (genus 2)", "scissors:build")
+RABBIT = GeneratedSample("rabbit", "object", "a sitting rabbit, 22 cm", "rabbit:build")
 POLE = GeneratedSample("pole", "object", "an upright pole, 1.2 m", "furniture:pole")
 CHAIR = GeneratedSample("chair", "object", "a wooden chair, seat at 45 cm", "furniture:chair")
 FLOOR = GeneratedSample("floor", "object", "a floor of 3 m by 3 m", "furniture:floor")
-ALL = (HUMAN_HAND, WITCH_HAND, ALIEN_HAND, TENTACLE, HUMAN_BODY, MUG, BASEBALL, SCISSORS, POLE, CHAIR, FLOOR)
+ALL = (
+    HUMAN_HAND,
+    WITCH_HAND,
+    ALIEN_HAND,
+    TENTACLE,
+    HUMAN_BODY,
+    MUG,
+    BASEBALL,
+    SCISSORS,
+    RABBIT,
+    POLE,
+    CHAIR,
+    FLOOR,
+)

@@ -1,0 +1,60 @@
+"""One tentacle, one strip, three wraps: the angle at which the axis starts.
+
+The strip is painted once along the tentacle's flat side with its axis in the middle. On the pole only the direction
+of the axis at its first point changes: steep, halfway, flat. The contacts join one by one along the chain when the
+pose is solved (solver `progressive`), so that the tail follows where the tentacle went.
+"""
+
+from functools import partial
+
+import numpy as np
+
+import contact_core as contact
+from contact_core.arrays import FloatArray
+from contact_core.geometry.raycast import Locator
+from contact_gallery.looks import rotation, view
+from contact_gallery.sheet import Sheet
+
+PAPER = "Figure 5"
+
+
+def draw(sheet: Sheet) -> None:
+    with contact.new(tentacle="sample:tentacle", pole="sample:pole", plugins=sheet.plugins) as session:
+        rig, skin, pole = session.rigs["tentacle"], session.mesh("tentacle"), Locator.of(session.mesh("pole"))
+        middle = rig.rest_world[5:20, :3, 3] + [0.0, 0.0, 0.05]  # over its flat side
+        along = Locator.of(skin).closest(middle).points
+        strokes = [
+            contact.BrushGesture(skin, along[k : k + 2], radius=width, spacing=0.35 * width)
+            for k, width in enumerate(np.linspace(0.014, 0.004, 14))
+        ]
+        with sheet.counting(session):
+            session.brush("disk", "strip", *strokes, surface="tentacle", axis=along)
+            session.place_surface("tentacle", rotation((0, 1, 0), 90.0, (0.3, 0.05, 0.0)))
+            root = pole.closest([(0.05, 0.3, 0.0)]).points
+            copy = session.transfer("strip", "pole", root, direction=(0.0, 0.3, 1.0))
+            session.scale(copy, along=0.8)  # the inner side of a bend is shorter than the skin at rest
+            session.pair("strip", copy)
+        start = session.revision
+        look = partial(view, session, camera_from=(1.0, 0.3, 0.7), patches=[copy])
+        near = np.array([(-0.1, 0.1, -0.1), (0.16, 0.62, 0.2)])
+        pictures = [look(caption="(a) the strip on the pole", frame=["tentacle"])]
+        for letter, degrees in zip("bcd", (40.0, 27.0, 16.0), strict=True):
+            session.goto(start)
+            with sheet.counting(session):
+                rise = np.tan(np.radians(degrees))
+                session.place(copy, root, direction=(0.0, rise, 1.0))
+                proposal = session.solve(solver="progressive")
+                session.accept(proposal)
+            pictures.append(look(caption=f"({letter}) start angle {degrees:.0f}°", focus=near))
+            met = proposal.after.patches["strip - " + copy]
+            turns = np.ptp(angle_round(session, copy)) / (2.0 * np.pi)
+            wrap = f"{turns:.1f} turns, {100 * met.opposed:.0f} % of the normals opposed"
+            cost = f"contacts {1000 * met.mean:.1f} mm apart, {proposal.after.seconds:.2f} s"
+            sheet.measure(f"start angle {degrees:.0f}°", f"{wrap}, {cost}", "the start angle changes the wrap")
+        sheet.show(*pictures, aspect=0.8)
+
+
+def angle_round(session: contact.Session, patch: str) -> FloatArray:
+    """The angle round the pole at each point of an axis, unwrapped."""
+    x, _, z = session.axis(patch).points.positions(session.mesh_of(patch)).T
+    return np.asarray(np.unwrap(np.arctan2(z, x)))
