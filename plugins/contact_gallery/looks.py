@@ -57,7 +57,7 @@ def view(
     see_through: surfaces that are drawn as glass. frame: surfaces that have to be in the picture. heat: by patch,
     RGB (n, 3) of its points in place of the patch's colour.
     """
-    drawn = surfaces or tuple(session.meshes)
+    drawn = surfaces or tuple(session.surfaces.meshes)
     posed = {name: in_world(session, name) for name in drawn}
     chosen = session.document.patches if patches is None else tuple(patches)
     shown = [name for name in chosen if session.document.patch(name).surface in posed]
@@ -74,7 +74,7 @@ def view(
         mesh = posed[patch.surface]
         meshes.append(painted(session, name, mesh, lift, (heat or {}).get(name)))
         if axes:
-            line = on(mesh, session.axis(name).points, 1.5 * lift)
+            line = on(mesh, session.geometry.axis(name).points, 1.5 * lift)
             meshes.append(PictureMesh(tube(line, 1.1 * lift), AXIS))
             starts.append(line[0])
     if focus is None:
@@ -93,7 +93,7 @@ def look_of(session: Session, surface: str) -> RGB:
 
 def in_world(session: Session, surface: str) -> TriangleMesh:
     """The mesh of a surface in its pose, where it stands in the scene."""
-    mesh, record = session.posed_mesh(surface), session.document.surface(surface)
+    mesh, record = session.geometry.posed_mesh(surface), session.document.surface(surface)
     world = record.world_from_surface
     return mesh if np.array_equal(world, np.eye(4)) else mesh.with_points(transform_points(world, mesh.points))
 
@@ -112,8 +112,8 @@ def painted(
     session: Session, patch: str, mesh: TriangleMesh, lift: float, heat: FloatArray | None = None
 ) -> PictureMesh:
     """A patch as paint on its surface: its points triangulated, a hair above."""
-    record, points = session.document.patch(patch), session.points(patch)
-    triangles = session.area(patch).triangles
+    record, points = session.document.patch(patch), session.geometry.points(patch)
+    triangles = session.geometry.area(patch).triangles
     faces = triangles[:, ::-1] if record.mirrored else triangles
     return PictureMesh(TriangleMesh(on(mesh, points, lift), faces), record.color, vertex_colors=heat)
 
@@ -137,7 +137,7 @@ def tube(points: FloatArray, radius: float, sides: int = 8) -> TriangleMesh:
 
 def spokes(session: Session, patch: str, every: int = 1) -> FloatArray:
     """(k, 2, 3) segments of the geodesics from a patch's axis to every so manieth of its points."""
-    document, mesh, axis = session.document, session.mesh_of(patch), session.axis(patch)
+    document, mesh, axis = session.document, session.geometry.mesh_of(patch), session.geometry.axis(patch)
     shape, record = document.shape_of(patch), document.patch(patch)
     coordinates = shape.coordinates
     legs, angles, lengths = patch_chains(
@@ -194,15 +194,15 @@ def paint_pad(
 
     along: where on the bone, 0 to 1. radius: metres.
     """
-    rig, skin = session.rigs[surface], Locator.of(session.mesh(surface))
+    rig, skin = session.rigs[surface], Locator.of(session.geometry.mesh(surface))
     index = rig.joint_index(joint)
     child = int(np.flatnonzero(rig.parents == index)[0])
     head, tail = rig.rest_world[index, :3, 3], rig.rest_world[child, :3, 3]
     palmar = (rig.rest_world[index, :3, :3] @ rig.freedoms[index].frame)[:, 1]
     pad = skin.cast([head + along * (tail - head)], [palmar]).points
     ahead = 0.7 * radius * (tail - head) / np.linalg.norm(tail - head)
-    axis = skin.closest(pad.positions(session.mesh(surface)) + np.array([-ahead, ahead])).points
-    session.brush("disk", patch, surface=surface, at=pad, radius=radius, spacing=0.17 * radius, axis=axis)
+    axis = skin.closest(pad.positions(session.geometry.mesh(surface)) + np.array([-ahead, ahead])).points
+    session.patches.brush("disk", patch, surface=surface, at=pad, radius=radius, spacing=0.17 * radius, axis=axis)
 
 
 def deepest(session: Session, surface: str, solid: str) -> float:

@@ -94,11 +94,11 @@ def test_the_operation_log_counts_what_is_done_and_undone_and_names_nobody(tmp_p
     ticks = iter(range(100))
     with contact.new(secret="sample:baseball", plugins=[contact_builtins], discover=False) as session:
         log = OperationLog(session, clock=lambda: float(next(ticks)))
-        session.brush("disk", "private", surface="secret", at=[(0.04, 0.0, 0.0)], radius=0.01)
-        session.rotate("private", 0.5)
+        session.patches.brush("disk", "private", surface="secret", at=[(0.04, 0.0, 0.0)], radius=0.01)
+        session.patches.rotate("private", 0.5)
         with session.stroke() as stroke:  # one operation, however long the drag
             for angle in (0.1, 0.2, 0.3):
-                stroke.rotate("private", angle)
+                stroke.patches.rotate("private", angle)
         session.undo()
         log.stop()
         session.redo()

@@ -25,24 +25,28 @@ PAPER = "Figure 14"
 def draw(sheet: Sheet) -> None:
     skin, along = curled(sheet)
     with contact.new(tentacle=skin, pole="sample:pole", plugins=sheet.plugins) as session:
-        pole = session.mesh("pole")
+        pole = session.geometry.mesh("pole")
         strokes = [
             contact.BrushGesture(skin, along[k : k + 2], radius=w, spacing=0.3 * w)
             for k, w in enumerate(np.linspace(0.018, 0.006, 16))
         ]
         with sheet.counting(session):
-            session.brush("disk", "strip", *strokes, surface="tentacle", axis=along)
+            session.patches.brush("disk", "strip", *strokes, surface="tentacle", axis=along)
             root = Locator.of(pole).closest([(0.05, 0.3, 0.0)]).points
-            copy = session.transfer("strip", "pole", root, direction=(0.0, 0.5, 1.0))
-        points, axis, placed = session.points("strip"), session.axis("strip"), session.axis(copy)
+            copy = session.patches.transfer("strip", "pole", root, direction=(0.0, 0.5, 1.0))
+        points, axis, placed = (
+            session.geometry.points("strip"),
+            session.geometry.axis("strip"),
+            session.geometry.axis(copy),
+        )
         near = np.array([(-0.03, 0.24, -0.03), (0.03, 0.52, 0.03)])
         bare = view(session, "pole", patches=[], camera_from=(1.0, 0.25, 0.0), focus=near)
         theirs = single_point(skin, points, axis, pole, placed)
         chain, length = boundary_alone(skin, points, axis, session.document.shape_of("strip"), pole, placed)
         loop = chain.points.positions(pole)
         pictures = [view(session, "tentacle", camera_from=(0.9, 0.3, -0.6), caption="(a) the strip")]
-        triangles = session.area("strip").triangles
-        for caption, there in (("(b) axis model", session.points(copy)), ("(c) one log map", theirs)):
+        triangles = session.geometry.area("strip").triangles
+        for caption, there in (("(b) axis model", session.geometry.points(copy)), ("(c) one log map", theirs)):
             found = measure_distortion(
                 triangles,
                 points.positions(skin),
@@ -78,8 +82,8 @@ def draw(sheet: Sheet) -> None:
 def curled(sheet: Sheet) -> tuple[contact.TriangleMesh, contact.SurfacePoints]:
     """The tentacle's skin with every joint flexed, as a mesh of its own, and points along the curl's outer side."""
     with contact.new(tentacle="sample:tentacle", plugins=sheet.plugins) as session:
-        rig, skin = session.rigs["tentacle"], session.mesh("tentacle")
+        rig, skin = session.rigs["tentacle"], session.geometry.mesh("tentacle")
         outer = Locator.of(skin).closest(rig.rest_world[3:20, :3, 3] + [0.0, 0.0, -0.06]).points
         angles = {f"{joint}.z": np.radians(13.0) for joint in rig.joints[1:-1]}
-        session.set_pose("tentacle", set_angles(rig, contact.Pose.rest(rig), angles))
-        return session.posed_mesh("tentacle"), outer
+        session.surfaces.set_pose("tentacle", set_angles(rig, contact.Pose.rest(rig), angles))
+        return session.geometry.posed_mesh("tentacle"), outer

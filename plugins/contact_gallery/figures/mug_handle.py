@@ -19,7 +19,7 @@ FINGERS = {"index": 68, "middle": 50, "ring": 32}  # heights on the handle, mm
 
 def draw(sheet: Sheet) -> None:
     with contact.new(hand="sample:human_hand", mug="sample:mug", plugins=sheet.plugins) as session:
-        rig, mug = session.rigs["hand"], Locator.of(session.mesh("mug"))
+        rig, mug = session.rigs["hand"], Locator.of(session.geometry.mesh("mug"))
         degrees = {f"{finger}_{bone}.z": angle for finger in (*FINGERS, "little")
                    for bone, angle in (("proximal", 65), ("intermediate", 90), ("distal", 40))}  # fmt: skip
         degrees |= {"thumb_metacarpal.x": -15, "thumb_metacarpal.z": 10, "thumb_distal.z": 20}
@@ -31,11 +31,11 @@ def draw(sheet: Sheet) -> None:
         ) -> None:
             paint_pad(session, "hand", name, bone, radius=radius)
             there = mug.cast([np.array(start) / 1000.0], [way]).points
-            session.pair(name, session.transfer(name, "mug", there, direction=direction), name=name)
+            session.pairs.add(name, session.patches.transfer(name, "mug", there, direction=direction), name=name)
 
         with sheet.counting(session):
-            session.place_surface("mug", in_hand)
-            session.set_pose("hand", curled)
+            session.surfaces.place("mug", in_hand)
+            session.surfaces.set_pose("hand", curled)
             for finger, height in FINGERS.items():
                 on_handle(
                     f"{finger} inside", f"{finger}_intermediate", (54, height, 0), (1.0, 0, -0.2), (-0.6, 0, 1.0)

@@ -34,17 +34,19 @@ def draw(sheet: Sheet) -> None:
             y = np.where(np.arange(54) % 2 == 0, 0.16, -0.16) + 0.1 * x
             drawn = on.cast(np.stack([x, y, np.full(54, 2.0)], axis=1), np.tile([0.0, 0.0, -1.0], (54, 1))).points
             axis = on.cast([(-0.75, -0.07, 2.0), (0.0, 0.0, 2.0), (0.85, 0.08, 2.0)], [(0, 0, -1)] * 3).points
-            session.brush("curve", "stroke", surface="gourd", at=drawn, spacing=0.03, radius=0.03, axis=axis)
+            session.patches.brush(
+                "curve", "stroke", surface="gourd", at=drawn, spacing=0.03, radius=0.03, axis=axis
+            )
             caption = f"({'abc'[len(before)]}) {len(mesh.faces):,} triangles"
             look = partial(view, session, camera_from=(0.0, 0.25, 1.0), colors={"gourd": (0.74, 0.77, 0.8)})
             wire = ((edges(mesh), (0.5, 0.53, 0.58) if level == 2 else (0.68, 0.71, 0.75)),) if level < 5 else ()
             before.append(replace(look(caption=caption), lines=wire))
-            session.translate("stroke", on.closest([(-0.6, 0.25, 1.5)]).points)
-            session.rotate("stroke", np.radians(-25.0))
-            middle = int(np.argmin(np.abs(session.axis("stroke").points.positions(mesh)[:, 0] - 0.1)))
-            session.bend("stroke", middle, np.radians(50.0))
+            session.patches.translate("stroke", on.closest([(-0.6, 0.25, 1.5)]).points)
+            session.patches.rotate("stroke", np.radians(-25.0))
+            middle = int(np.argmin(np.abs(session.geometry.axis("stroke").points.positions(mesh)[:, 0] - 0.1)))
+            session.patches.bend("stroke", middle, np.radians(50.0))
             after.append(replace(look(caption="translated, rotated, bent"), lines=wire))
-            where.append(session.points("stroke").positions(mesh))
+            where.append(session.geometry.points("stroke").positions(mesh))
     sheet.show(*before, aspect=1.5)
     sheet.show(*after, aspect=1.5)
     sheet.measure("triangles", ", ".join(f"{20 * 4**level:,}" for level in LEVELS), "coarse and fine")

@@ -23,20 +23,20 @@ PADS = {  # pad: its bone, how far along it, from where in the loop (mm), and wh
 
 def draw(sheet: Sheet) -> None:
     with contact.new(hand="sample:human_hand", scissors="sample:scissors", plugins=sheet.plugins) as session:
-        rig, scissors = session.rigs["hand"], Locator.of(session.mesh("scissors"))
+        rig, scissors = session.rigs["hand"], Locator.of(session.geometry.mesh("scissors"))
         degrees = {"index_proximal.z": 50, "middle_proximal.z": 50, "ring_proximal.z": 65, "little_proximal.z": 65}
         degrees |= {f"{finger}_intermediate.z": 30 for finger in ("index", "middle", "ring", "little")}
         degrees |= {"thumb_metacarpal.x": -29, "thumb_metacarpal.y": -34, "thumb_metacarpal.z": 17}
         half_closed = set_angles(rig, contact.Pose.rest(rig), {dof: np.radians(a) for dof, a in degrees.items()})
         in_hand = np.array([[0, 1, 0, 0.09], [0, 0, -1, 0.12], [-1, 0, 0, 0.09], [0, 0, 0, 1]])
         with sheet.counting(session):
-            session.place_surface("scissors", in_hand)
-            session.set_pose("hand", half_closed)
+            session.surfaces.place("scissors", in_hand)
+            session.surfaces.set_pose("hand", half_closed)
             for name, (bone, along, inside, way) in PADS.items():
                 paint_pad(session, "hand", name, bone, along=along, radius=0.0055)
                 rim = scissors.cast([np.array(inside) / 1000.0], [way]).points
-                copy = session.transfer(name, "scissors", rim, direction=(0, 0, -1))
-                session.pair(name, copy, name=name)
+                copy = session.patches.transfer(name, "scissors", rim, direction=(0, 0, -1))
+                session.pairs.add(name, copy, name=name)
             before = view(
                 session, camera_from=(0.9, -0.3, -0.6), see_through=["hand"], caption="(a) three pads, three rims"
             )

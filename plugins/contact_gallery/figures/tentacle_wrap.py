@@ -20,7 +20,11 @@ PAPER = "Figure 5"
 
 def draw(sheet: Sheet) -> None:
     with contact.new(tentacle="sample:tentacle", pole="sample:pole", plugins=sheet.plugins) as session:
-        rig, skin, pole = session.rigs["tentacle"], session.mesh("tentacle"), Locator.of(session.mesh("pole"))
+        rig, skin, pole = (
+            session.rigs["tentacle"],
+            session.geometry.mesh("tentacle"),
+            Locator.of(session.geometry.mesh("pole")),
+        )
         middle = rig.rest_world[5:20, :3, 3] + [0.0, 0.0, 0.05]  # over its flat side
         along = Locator.of(skin).closest(middle).points
         strokes = [
@@ -28,12 +32,12 @@ def draw(sheet: Sheet) -> None:
             for k, width in enumerate(np.linspace(0.014, 0.004, 14))
         ]
         with sheet.counting(session):
-            session.brush("disk", "strip", *strokes, surface="tentacle", axis=along)
-            session.place_surface("tentacle", rotation((0, 1, 0), 90.0, (0.3, 0.05, 0.0)))
+            session.patches.brush("disk", "strip", *strokes, surface="tentacle", axis=along)
+            session.surfaces.place("tentacle", rotation((0, 1, 0), 90.0, (0.3, 0.05, 0.0)))
             root = pole.closest([(0.05, 0.3, 0.0)]).points
-            copy = session.transfer("strip", "pole", root, direction=(0.0, 0.3, 1.0))
-            session.scale(copy, along=0.8)  # the inner side of a bend is shorter than the skin at rest
-            session.pair("strip", copy)
+            copy = session.patches.transfer("strip", "pole", root, direction=(0.0, 0.3, 1.0))
+            session.patches.scale(copy, along=0.8)  # the inner side of a bend is shorter than the skin at rest
+            session.pairs.add("strip", copy)
         start = session.revision
         look = partial(view, session, camera_from=(1.0, 0.3, 0.7), patches=[copy])
         near = np.array([(-0.1, 0.1, -0.1), (0.16, 0.62, 0.2)])
@@ -42,7 +46,7 @@ def draw(sheet: Sheet) -> None:
             session.goto(start)
             with sheet.counting(session):
                 rise = np.tan(np.radians(degrees))
-                session.place(copy, root, direction=(0.0, rise, 1.0))
+                session.patches.place(copy, root, direction=(0.0, rise, 1.0))
                 proposal = session.solve(solver="progressive")
                 session.accept(proposal)
             pictures.append(look(caption=f"({letter}) start angle {degrees:.0f}°", focus=near))
@@ -56,5 +60,5 @@ def draw(sheet: Sheet) -> None:
 
 def angle_round(session: contact.Session, patch: str) -> FloatArray:
     """The angle round the pole at each point of an axis, unwrapped."""
-    x, _, z = session.axis(patch).points.positions(session.mesh_of(patch)).T
+    x, _, z = session.geometry.axis(patch).points.positions(session.geometry.mesh_of(patch)).T
     return np.asarray(np.unwrap(np.arctan2(z, x)))
