@@ -46,8 +46,8 @@ def draw(sheet: Sheet) -> None:
             replace(there, lines=lines[1]),
             aspect=1.2,
         )
-        found, back = session.geometry.distortion("palm", copy), session.patches.transfer(copy, "hand", session.geometry.root("palm").point(),
-            heading=session.geometry.root("palm").heading)  # fmt: skip
+        found, home = session.geometry.distortion("palm", copy), session.geometry.root("palm")
+        back = session.patches.transfer(copy, "hand", home.point(), heading=home.heading)
         lost = np.linalg.norm(session.geometry.points(back).positions(hand) - near, axis=1).max()
         sheet.measure("points, axis points", f"{len(near)}, {len(session.geometry.axis('palm'))}")
         sheet.measure("folds on the ball", f"{found.folds}", "approximately isometric")
