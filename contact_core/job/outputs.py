@@ -14,7 +14,7 @@ from contact_core.atomic_set import replacing_set
 from contact_core.document.schema import dump_document
 from contact_core.errors import ContactError
 from contact_core.job.pictures import pictures_of
-from contact_core.job.report import DEFINITIONS, SCHEMA, table
+from contact_core.job.report import DEFINITIONS, SCHEMA, inputs_of, table
 from contact_core.job.workpiece import Job, JobResult
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS, RENDERERS
@@ -93,6 +93,8 @@ def report_of(job: Job, renderer: str | None) -> dict[str, Any]:
             "schema": "contact.report",
             "version": SCHEMA,
             "contact_core": __version__,
+            "solver": job.solution.solver,
+            "inputs": inputs_of(job.recipe),
             "recipe": job.recipe.name,
             "verdict": "grasp" if job.verdict.is_grasp else "bad",
             "failures": list(job.verdict.failures),

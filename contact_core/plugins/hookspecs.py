@@ -61,6 +61,9 @@ def contact_samples() -> Offers:
 def contact_commands() -> Offers:
     """Edit commands: `edit.command.Command` (classes), so that journals which hold them replay."""
 @hookspec
+def contact_job_kinds() -> Offers:
+    """Kinds of jobs for `contact batch`: `plugins.slots.JobKind`."""
+@hookspec
 def contact_cli() -> Offers:
     """Sub-commands of `contact`: `plugins.slots.CliCommand`."""
 @hookspec(firstresult=True)

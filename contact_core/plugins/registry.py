@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from contact_core.edit.command import Command
     from contact_core.geometry.engine import GeodesicEngine
     from contact_core.interaction.tool import Tool
-    from contact_core.plugins.slots import CliCommand, Format, Placer, Renderer, Sample
+    from contact_core.plugins.slots import CliCommand, Format, JobKind, Placer, Renderer, Sample
     from contact_core.scene.host import HostAdapter
     from contact_core.solve.solver import PoseSolver
     from contact_core.solve.terms import PoseTerm
@@ -69,12 +69,17 @@ HOSTS: Slot[type[HostAdapter]] = Slot(
 )
 FORMATS: Slot[Format] = Slot("contact_formats", "format", "contact_core.plugins.slots:Format")
 TOOLS: Slot[Tool] = Slot("contact_tools", "tool", "contact_core.interaction.tool:Tool")
-RENDERERS: Slot[Renderer] = Slot("contact_renderers", "renderer", "contact_core.plugins.slots:Renderer")
+RENDERERS: Slot[Renderer] = Slot(
+    "contact_renderers", "renderer", "contact_core.plugins.slots:Renderer", roles=("thumbnail",)
+)
 SAMPLES: Slot[Sample] = Slot("contact_samples", "sample", "contact_core.plugins.slots:Sample")
 COMMANDS: Slot[type[Command]] = Slot(
     "contact_commands", "command", "contact_core.edit.command:Command", key="json_id", instances=False,
     core="contact_core.edit.command_table:BUILT_IN_COMMANDS",
 )  # fmt: skip
+JOB_KINDS: Slot[JobKind] = Slot(
+    "contact_job_kinds", "kind of job", "contact_core.plugins.slots:JobKind", core="contact_core.farm.kinds:OWN"
+)
 CLI: Slot[CliCommand] = Slot("contact_cli", "sub-command", "contact_core.plugins.slots:CliCommand")
 
 SLOTS: tuple[Slot[Any], ...] = (
@@ -90,6 +95,7 @@ SLOTS: tuple[Slot[Any], ...] = (
     RENDERERS,
     SAMPLES,
     COMMANDS,
+    JOB_KINDS,
     CLI,
 )
 

@@ -1,4 +1,4 @@
-"""The plugin slots that belong to no lower floor: formats, samples, renderers, placers, sub-commands.
+"""The plugin slots that belong to no lower floor: formats, samples, renderers, placers, jobs, sub-commands.
 
 The protocols of the other slots live with what they serve: `contact.brush.Brush`,
 `contact.axis_generator.AxisGenerator`, `solve.terms.PoseTerm`, `solve.solver.PoseSolver`,
@@ -19,6 +19,8 @@ if TYPE_CHECKING:  # so that `contact --help`, which asks for sub-commands, load
     from contact_core.document.asset import Asset
     from contact_core.geometry.mesh import TriangleMesh
     from contact_core.geometry.surface_point import SurfacePoints
+    from contact_core.plugins.manager import PluginManager
+    from contact_core.progress import Progress
     from contact_core.rig.rig import Pose, Rig
     from contact_core.scene.picture import Picture
 
@@ -126,6 +128,59 @@ class Placer(Protocol):
     def summary(self) -> str: ...
 
     def place(self, request: PlacementRequest) -> PlacementResult: ...
+
+
+@dataclass(frozen=True)
+class JobRequest:
+    """One job of `contact batch`. path: its file. folder: where its results go, made if absent.
+
+    frames: rising, None for the scene as it stands. solver: a name, None leaves the choice to the plugins. assets:
+    a folder with files of surfaces, for jobs that name none.
+    """
+
+    path: Path
+    folder: Path
+    frames: tuple[float, ...] | None = None
+    solver: str | None = None
+    assets: Path | None = None
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """What a job came to. files: names of its results in the folder. picture: which of them is one.
+
+    badness: 0 is perfect, 1 at the limit of what is accepted; the report sorts by it. failures: sentences on what
+    is not accepted. rows: name, value, whether it fails. inputs: files that a library opened without Python, which
+    notes what it opens itself.
+    """
+
+    files: tuple[str, ...]
+    badness: float = 0.0
+    failures: tuple[str, ...] = ()
+    rows: tuple[tuple[str, str, bool], ...] = ()
+    notes: tuple[str, ...] = ()
+    picture: str | None = None
+    inputs: tuple[Path, ...] = ()
+
+
+@runtime_checkable
+class JobKind(Protocol):
+    """A kind of job that `contact batch` runs (hook `contact_job_kinds`), in a worker process without a display."""
+
+    name: str
+    summary: str
+    suffixes: tuple[str, ...]  # of its files, lower case
+
+    def claims(self, path: Path) -> bool:
+        """Whether a file with one of the suffixes, found in a folder, is such a job. Cheap; never raises."""
+        ...
+
+    def run(self, request: JobRequest, plugins: PluginManager, progress: Progress) -> JobOutcome:
+        """Do the job and place its results in the folder: all of them or none; the same again gives the same.
+
+        Raises ContactError in a sentence, Cancelled where progress raises it.
+        """
+        ...
 
 
 @runtime_checkable

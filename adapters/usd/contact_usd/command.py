@@ -1,21 +1,20 @@
-"""`contact usd`: look into stages, write assets to them, bring contacts onto shots, solve shots."""
+"""`contact usd`: look into stages, write assets to them, bring contacts onto shots, solve and publish them."""
 
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from contact_core.cli.frames import frames_of
+from contact_core.errors import InvalidInput
 from contact_core.progress import Progress
-
-_MOST_FRAMES = 100_000  # in one range: an hour at 24 frames a second
 
 
 class UsdCommand:
     name = "usd"
-    summary = "inspect USD stages, export assets to them, transfer contacts to shots, solve shots"
+    summary = "inspect USD stages, export assets to them, transfer contacts to shots, solve and publish shots"
 
     def configure(self, parser: argparse.ArgumentParser) -> None:
         actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
@@ -32,7 +31,9 @@ class UsdCommand:
         solve = actions.add_parser("solve", help="solve the contact pairs of shots and key the poses")
         solve.add_argument("--frames", type=_frames, metavar="1,5,10-20", help="time codes; without, no key is set")
         solve.add_argument("--solver", metavar="NAME")
-        for action in (transfer, solve):
+        publish = actions.add_parser("publish", help="write contacts as points and curves that every viewer shows")
+        publish.add_argument("--frames", type=_frames, metavar="1,5,10-20", help="time codes to key them at")
+        for action in (transfer, solve, publish):
             action.add_argument("shots", nargs="+", type=Path, metavar="SHOT")
             action.add_argument(
                 "--out", type=Path, metavar="DIR", help="folder for the layers; else beside each shot"
@@ -52,6 +53,7 @@ class UsdCommand:
             "export": _export,
             "transfer": _transfer,
             "solve": _solve,
+            "publish": _publish,
         }
         _need_pxr()
         return actions[arguments.action](arguments)
@@ -93,8 +95,6 @@ def _inspect(arguments: argparse.Namespace) -> int:
 
 
 def _object_facts(host: Any, item: Any) -> dict[str, Any]:
-    from contact_core.errors import InvalidInput
-
     facts: dict[str, Any] = {"id": item.id, "kind": item.kind}
     try:
         asset = host.read_surface(item.id)
@@ -165,6 +165,13 @@ def _solve(arguments: argparse.Namespace) -> int:
     return _each_shot(arguments, work)
 
 
+def _publish(arguments: argparse.Namespace) -> int:
+    from contact_usd import shots
+
+    frames, wanted = arguments.frames, dict(arguments.surface)
+    return _each_shot(arguments, lambda path, out, _: shots.review(path, frames, wanted, out))
+
+
 Work = Callable[[Path, Path | None, Progress], dict[str, object]]
 
 
@@ -195,8 +202,6 @@ def _each_shot(arguments: argparse.Namespace, work: Work) -> int:
 
 def _check_alone(path: Path, first: Path, name: str) -> None:
     """Shots of one name would write one layer, and only the last would be left."""
-    from contact_core.errors import InvalidInput
-
     if first is not path:
         raise InvalidInput(f"{first} and this shot both write {name} there; give each an --out folder of its own.")
 
@@ -210,23 +215,11 @@ def _told(facts: dict[str, Any]) -> str:
     )
 
 
-def _frames(text: str) -> list[float]:
-    """1,5,10-20 as numbers, rising."""
-    frames: set[float] = set()
+def _frames(text: str) -> tuple[float, ...]:
     try:
-        for part in text.split(","):
-            first, dash, last = part.strip().partition("-")
-            several = range(int(first), int(last) + 1) if dash and first else None
-            if several is not None and not 0 < len(several) <= _MOST_FRAMES:
-                raise ValueError
-            frames |= {float(part)} if several is None else set(map(float, several))
-        if not all(map(math.isfinite, frames)):
-            raise ValueError
-    except (ValueError, OverflowError) as error:
-        raise argparse.ArgumentTypeError(
-            f"frames are like 1,5,10-20, rising and at most {_MOST_FRAMES} in a range, but {text!r} came"
-        ) from error
-    return sorted(frames)
+        return frames_of(text)
+    except InvalidInput as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from error
 
 
 def _binding(text: str) -> tuple[str, str]:

@@ -18,7 +18,8 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
 from contact_core.arrays import FloatArray
-from contact_core.document.document import ContactPair
+from contact_core.document.document import ContactDocument, ContactPair
+from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.transform import transform_points
@@ -76,6 +77,22 @@ def publish(host: UsdHost, session: Session, prims: Mapping[str, str]) -> None:
         for name, key in _identifiers(document.pairs).items():
             _write_pair(host.stage, PAIRS.AppendChild(key), name, document.pairs[name], paths)
         _hide_those_below(host.stage, host.layer)
+
+
+def key(host: UsdHost, document: ContactDocument, geometry: DocumentGeometry, frame: float) -> None:
+    """Key what is published where it is at a frame. document, geometry: as the scene has them at that frame."""
+    with host.step("Key contacts"), Usd.EditContext(host.stage, Usd.EditTarget(host.layer)):
+        for name, key_ in _identifiers(document.patches).items():
+            surface = document.surfaces[document.patches[name].surface]
+            mesh, path = geometry.posed_mesh(surface.name), PATCHES.AppendChild(key_)
+            drawn = {path: geometry.reconstruction(name).points, _axis_path(path): geometry.axis(name).points}
+            for place, points in drawn.items():
+                prim = UsdGeom.PointBased(host.stage.GetPrimAtPath(place))
+                if prim:
+                    positions = _placed(points.positions(mesh), surface.world_from_surface).astype(np.float32)
+                    prim.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(positions), frame)
+                    extent = UsdGeom.Boundable.ComputeExtentFromPlugins(prim, frame)
+                    prim.GetExtentAttr().Set(extent, frame)
 
 
 def read_patches(stage: Usd.Stage) -> tuple[PatchPrim, ...]:
@@ -156,7 +173,7 @@ def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, 
     axis = session.geometry.axis(name).points
     targets = []
     if len(axis) > 1:
-        curve_path = path.GetParentPath().AppendChild(f"{path.name}_axis")
+        curve_path = _axis_path(path)
         curves = UsdGeom.BasisCurves.Define(stage, curve_path)
         curves.CreateTypeAttr(UsdGeom.Tokens.linear)
         curves.CreateCurveVertexCountsAttr(Vt.IntArray([len(axis)]))
@@ -165,6 +182,10 @@ def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, 
         _write_points(curves, _placed(axis.positions(mesh), surface.world_from_surface), axis, patch.color)
         targets = [curve_path]
     prim.CreateRelationship("contact:axis", False).SetTargets(targets)
+
+
+def _axis_path(path: Sdf.Path) -> Sdf.Path:
+    return path.GetParentPath().AppendChild(f"{path.name}_axis")
 
 
 def _write_points(

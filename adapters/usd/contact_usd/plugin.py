@@ -11,6 +11,11 @@ def contact_hosts() -> list[object]:
 
 
 @hookimpl
+def contact_job_kinds() -> list[object]:
+    return ["contact_usd.jobs:ShotJob"]
+
+
+@hookimpl
 def contact_cli() -> list[object]:
     return ["contact_usd.command:UsdCommand"]
 

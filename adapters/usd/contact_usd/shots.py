@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from contact_core.document.document import ContactDocument
+from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.errors import Cancelled, FileRefused, InvalidInput
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.proposals.proposal import Proposal
 from contact_core.session import Session
 from contact_core.solve.solver import PoseSolution, SolveStatus
 from contact_usd import contacts
@@ -22,17 +24,22 @@ from contact_usd.stage_io import SUFFIXES
 
 @contextlib.contextmanager
 def open_shot(
-    path: Path, surfaces: Mapping[str, str] | None = None, plugins: PluginManager | None = None
+    path: Path,
+    surfaces: Mapping[str, str] | None = None,
+    plugins: PluginManager | None = None,
+    mend: Callable[[Session], None] | None = None,
 ) -> Iterator[Session]:
     """A session on a stage, every surface of its document bound to a prim.
 
-    surfaces: prim paths by surface, for those that cannot be told.
+    surfaces: prim paths by surface, for those that cannot be told. mend: may bind what is missing.
 
     The stage ends with the block, so that the next shot finds files as they are then. Raises InvalidInput for a
     surface without a prim.
     """
     session = Session(host=UsdHost(path), surfaces=surfaces, plugins=plugins if plugins is not None else ())
     try:
+        if mend is not None:
+            mend(session)
         for name, why in session.binding.missing.items():
             raise InvalidInput(f"{why} Name its prim with --surface {name}=PATH.")
         yield session
@@ -45,13 +52,56 @@ def prims_of(session: Session) -> dict[str, str]:
     return {name: found.object_id for name, found in session.binding.surfaces.items()}
 
 
-def publish(session: Session) -> None:
-    """Remember which prim is which, and write what viewers see."""
+def contact_layer(path: Path, folder: Path | None = None) -> Path:
+    """The file that holds the contacts of a shot: the shot itself, else NAME.contact.usda in `folder` or beside it.
+
+    Raises InvalidInput that names the layer where there is none, or where it lies over another shot.
+    """
+    host = UsdHost(path)
+    if host.stored_document() is not None:
+        return path
+    name = f"{path.stem}.contact.usda"
+    places = dict.fromkeys(place / name for place in (folder, path.parent) if place is not None)
+    layer = next((place for place in places if place.is_file()), None)
+    if layer is None:
+        raise InvalidInput(
+            f"{path} has no contact pairs of its own, and there is no {' nor '.join(map(str, places))}. Bring"
+            f" contacts onto the shot with `contact usd transfer CONTACTS {path.name}`, or name the layer that has"
+            " them."
+        )
+    over = UsdHost(layer)  # held until its list is copied
+    below = list(over.layer.subLayerPaths)
+    if path.resolve() not in {Path(item).resolve() for item in below}:
+        raise InvalidInput(f"{layer} lies over {', '.join(below) or 'no shot'}, not over {path}; name the layer.")
+    return layer
+
+
+def publish(session: Session, frames: Sequence[float] = ()) -> None:
+    """Remember which prim is which, and write what viewers see; where contacts are at frames is keyed there."""
     prims = prims_of(session)
     key = session.binding.key
     if dict(session.document.extras.get(key, {})) != prims:
         session.set_extra(key, dict(prims))
     contacts.publish(session.host, session, prims)
+    for frame in frames:
+        document = session.binding.read(session.document.at(frame), frame)
+        contacts.key(session.host, document, geometry_of(session, document), frame)
+
+
+def geometry_of(session: Session, document: ContactDocument) -> DocumentGeometry:
+    """Where the contacts of another document are on the session's meshes and rigs."""
+    return DocumentGeometry(lambda: document, session.derived, session.rigs)
+
+
+def review(
+    path: Path, frames: Sequence[float] | None, wanted: Mapping[str, str], out: Path | None
+) -> dict[str, object]:
+    """Write contacts as points and curves that every viewer shows, keyed at frames; facts for the report."""
+    with open_shot(contact_layer(path, None if out is None else out.parent), wanted) as shot:
+        with shot.host.step("Publish contacts"):
+            publish(shot, frames or ())
+        shot.host.save(out)
+        return {"patches": list(shot.document.patches), "surfaces": prims_of(shot)}
 
 
 def read_contacts(path: Path) -> ContactDocument:
@@ -100,23 +150,31 @@ def solve(
 ) -> dict[str, object]:
     """Solve the pairs of a shot at frames, key the rigs there and save it; facts for the report.
 
-    frames: None for one solve without a key. Each frame starts from the animator's pose, later ones from the last.
-    solver: a name; None leaves the choice to the plugins.
+    path: the shot, or its contact layer. frames: None for one solve without a key. Each frame starts from the
+    animator's pose, later ones from the last. solver: a name; None leaves the choice to the plugins.
     """
-    with open_shot(path, wanted, plugins) as shot:
-        if not shot.document.pairs:
-            raise InvalidInput(f"{path} has no contact pairs, so there is nothing to solve.")
+    with open_shot(contact_layer(path, None if out is None else out.parent), wanted, plugins) as shot:
         times: Sequence[float | None] = [None] if frames is None else frames
         try:
-            proposal = shot.solve(frames=frames, solver=solver, progress=progress)
+            proposal = solve_open(shot, frames, solver, out, progress)
         except Cancelled:  # before the first frame
             return {"frames": [_frame_facts(frame, None) for frame in times]}
-        if proposal.after.status is not SolveStatus.CANCELLED:
-            with shot.host.step("Solve and key"):
-                shot.accept(proposal)
-                publish(shot)
-            shot.host.save(out)
         return {"frames": [_frame_facts(*known) for known in itertools.zip_longest(times, proposal.solutions)]}
+
+
+def solve_open(
+    shot: Session, frames: Sequence[float] | None, solver: str | None, out: Path | None, progress: Progress
+) -> Proposal:
+    """Solve an open shot, and unless that was cancelled accept and publish what came out and save it."""
+    if not shot.document.pairs:
+        raise InvalidInput("the shot has no contact pairs, so there is nothing to solve.")
+    proposal = shot.solve(frames=frames, solver=solver, progress=progress)
+    if proposal.after.status is not SolveStatus.CANCELLED:
+        with shot.host.step("Solve and key"):
+            shot.accept(proposal)
+            publish(shot, frames or ())
+        shot.host.save(out)
+    return proposal
 
 
 def _frame_facts(frame: float | None, solution: PoseSolution | None) -> dict[str, object]:

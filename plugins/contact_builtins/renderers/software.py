@@ -34,6 +34,7 @@ class SoftwareRenderer:
     name = "software"
     summary = "plain pictures by numpy alone, where no graphics card is"
     priority = 0
+    default_for = "thumbnail"
 
     def unavailable(self) -> str | None:
         return None

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,13 +13,12 @@ import pytest
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from contact_core.cli import main
-from contact_core.document.asset import Asset
-from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.rig.rig import Pose
-from contact_core.session import Session
+from contact_core.testing import meshes
 from contact_core.testing.host_checks import pose_error
 from contact_core.testing.host_scenes import arm_rig
 from contact_usd import contacts
@@ -31,52 +28,9 @@ from contact_usd.shots import open_shot
 ARM, BALL = "/arm_rig/arm", "/ball"
 
 
-def parity() -> ModuleType:
-    """parity_script.py, for its ball; test folders are no packages."""
-    if "parity_script" not in sys.modules:
-        path = Path(__file__).parents[1] / "parity_script.py"
-        spec = importlib.util.spec_from_file_location("parity_script", path)
-        assert spec is not None and spec.loader is not None
-        sys.modules["parity_script"] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(sys.modules["parity_script"])
-    return sys.modules["parity_script"]
-
-
-@pytest.fixture
-def sequence(tmp_path: Path) -> Path:
-    """asset.usda, two shots over it with a moving ball, and contacts.usda with painted contacts."""
-    rig = arm_rig()
-    made = UsdHost()
-    place = np.eye(4)
-    place[:3, 3] = (1.2, 3.0, 0.0)
-    made.add(Asset("arm", rig.surface, rig, meters_per_unit=1.0))
-    made.add(Asset("ball", parity()._ball(0.5), meters_per_unit=1.0), place)
-    made.layer.customLayerData = {}  # assets like any other
-    made.save(tmp_path / "asset.usda")
-    for name, far in (("shot010", 0.2), ("shot020", -0.4)):
-        layer = Sdf.Layer.CreateNew(str(tmp_path / f"{name}.usda"))
-        layer.subLayerPaths = ["asset.usda"]
-        stage = Usd.Stage.Open(layer)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        move = UsdGeom.Xformable(stage.GetPrimAtPath(BALL)).GetOrderedXformOps()[0]
-        for frame in (1.0, 3.0):
-            move.Set(Gf.Matrix4d(1.0).SetTranslate((1.2, 3.0 + far * frame, 0.0)), frame)
-        layer.Save()
-    host = UsdHost(tmp_path / "asset.usda")
-    session = Session(host=host, discover=False)
-    surfaces = {name: host.read_surface(path) for name, path in (("arm", ARM), ("ball", BALL))}
-    for name, path in (("arm", ARM), ("ball", BALL)):
-        asset = surfaces[name]
-        session.surfaces.add(name, asset.mesh, rig=asset.rig, world_from_surface=host.placement(path))
-    skin = surfaces["arm"].mesh
-    order = np.argsort(np.linalg.norm(skin.points - [0.3, 2.8, 0.0], axis=1), kind="stable")[:6]
-    points = SurfacePoints.at_vertices(skin, order)
-    session.patches.paint("tip", points, surface="arm", axis=points[[0, 3]])
-    ball = surfaces["ball"].mesh
-    nearest = SurfacePoints.at_vertices(ball, [int(np.argmin(ball.points[:, 0]))])
-    session.pairs.add("tip", session.patches.transfer("tip", "ball", nearest, heading=1.0 + 0.0j))
-    host.save(tmp_path / "contacts.usda")
-    return tmp_path
+def parity_ball(radius: float, level: int) -> TriangleMesh:
+    ball = meshes.icosphere(level)
+    return TriangleMesh(radius * ball.points, ball.faces)
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: Any) -> tuple[int, Any]:
@@ -203,3 +157,90 @@ def test_a_name_that_is_not_unicode_is_refused_in_words(sequence: Path, capsys: 
     assert main(["usd", "inspect", str(path)]) == 2
     assert "not Unicode" in capsys.readouterr().err
     assert main(["usd", "transfer", str(sequence / "contacts.usda"), str(path)]) == 1
+
+
+def test_solve_on_a_shot_finds_its_contact_layer(sequence: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shot = sequence / "shot010.usda"
+    code, facts = told(capsys, "solve", shot)
+    assert code == 1 and f"there is no {sequence / 'shot010.contact.usda'}" in facts[0]["failed"]
+    assert "contact usd transfer" in facts[0]["failed"]
+    told(capsys, "transfer", sequence / "contacts.usda", shot)
+    code, facts = told(capsys, "solve", shot, "--frames", "1")
+    assert code == 0 and UsdHost(sequence / "shot010.contact.usda").pose_keys(ARM) == (1.0,)
+
+    (sequence / "shot020.contact.usda").write_bytes((sequence / "shot010.contact.usda").read_bytes())
+    code, facts = told(capsys, "solve", sequence / "shot020.usda")
+    assert code == 1 and "shot010.usda, not over" in facts[0]["failed"]
+
+
+def test_publish_keys_what_a_plain_viewer_shows(sequence: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Points and curves with colours lie on the skin and the ball at every frame, read by pxr alone."""
+    shot = sequence / "shot010.usda"
+    told(capsys, "transfer", sequence / "contacts.usda", shot)
+    told(capsys, "solve", shot, "--frames", "1,3")
+    out = sequence / "review"
+    code, facts = told(capsys, "publish", shot, "--frames", "1,3", "--out", out)
+    assert code == 0 and len(facts[0]["patches"]) == 2
+    stage = Usd.Stage.Open(str(out / "shot010.contact.usda"))
+    drawn = [prim for prim in stage.Traverse() if prim.GetTypeName() in ("Points", "BasisCurves")]
+    assert {prim.GetTypeName() for prim in drawn} == {"Points", "BasisCurves"}
+    host = UsdHost(shot)
+    for prim in drawn:
+        shape = UsdGeom.PointBased(prim)
+        assert shape.GetDisplayColorAttr().Get() and shape.GetPointsAttr().GetTimeSamples() == [1.0, 3.0]
+        assert len(prim.GetAttribute("widths").Get()) and shape.ComputePurpose() == "default"
+    ball = host.read_surface(BALL).mesh
+    on_ball = next(p for p in contacts.read_patches(stage) if p.surface == BALL)
+    path = next(p for p in drawn if p.GetAttribute("contact:name").Get() == on_ball.name)
+    for frame in (1.0, 3.0):
+        place = host.placement(BALL, frame)
+        seen = np.asarray(UsdGeom.Points(path).GetPointsAttr().Get(frame))
+        expected = on_ball.points.positions(ball) @ place[:3, :3].T + place[:3, 3]
+        assert np.abs(seen - expected).max() < 1e-5
+        low, high = np.asarray(UsdGeom.Points(path).GetExtentAttr().Get(frame))
+        assert (low <= seen.min(axis=0) + 1e-5).all() and (high >= seen.max(axis=0) - 1e-5).all()
+
+
+def test_a_batch_of_shots_solves_again_what_changed(sequence: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A layer that moved only one shot's ball concerns that shot; an asset with new triangles concerns all."""
+    shots = [sequence / "shot010.usda", sequence / "shot020.usda"]
+    told(capsys, "transfer", sequence / "contacts.usda", *shots)
+    out = sequence / "out"
+
+    def batch(*jobs: Path) -> dict[str, Any]:
+        arguments = ["batch", "--json", *map(str, jobs), "--out", str(out), "--frames", "1,3", "--workers", "0"]
+        assert main(arguments) == 0
+        return {job["name"]: job for job in json.loads(capsys.readouterr().out)["jobs"]}
+
+    found = batch(sequence)  # in a folder, the contact layers are the jobs
+    assert set(found) == {"shot010.contact", "shot020.contact"}
+    found = batch(*shots)
+    assert {job["state"] for job in found.values()} == {"done"} and set(found) == {"shot010", "shot020"}
+    assert UsdHost(out / "shot010" / "shot010.contact.usda").pose_keys(ARM) == (1.0, 3.0)
+    assert (out / "shot010" / "picture.png").stat().st_size > 1000
+    assert {job["state"] for job in batch(*shots).values()} == {"same"}
+
+    layer = Sdf.Layer.FindOrOpen(str(shots[1]))
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.Xformable(stage.GetPrimAtPath(BALL)).GetOrderedXformOps()[0].Set(
+        Gf.Matrix4d(1.0).SetTranslate((1.2, 2.9, 0.0)), 3.0
+    )
+    layer.Save()
+    del stage, layer
+    assert {name: job["state"] for name, job in batch(*shots).items()} == {"shot010": "same", "shot020": "done"}
+
+    stage = Usd.Stage.Open(str(sequence / "asset.usda"))
+    finer = parity_ball(0.5, 2)
+    prim = UsdGeom.Mesh(stage.GetPrimAtPath(BALL))
+    prim.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(finer.points.astype(np.float32)))
+    prim.GetFaceVertexCountsAttr().Set(Vt.IntArray([3] * len(finer.faces)))
+    prim.GetFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(finer.faces.astype(np.int32).ravel()))
+    stage.GetRootLayer().Save()
+    del prim, stage
+    found = batch(*shots)
+    assert {job["state"] for job in found.values()} == {"done"}
+    assert all("has other triangles now" in job["notes"][0] for job in found.values()), found
+    with open_shot(out / "shot010" / "shot010.contact.usda") as shot:
+        (pair,) = shot.geometry.pairs()
+        theirs = pair.object_points.positions(finer)
+        assert np.abs(np.linalg.norm(theirs, axis=1) - 0.5).max() < 0.05

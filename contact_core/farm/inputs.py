@@ -1,0 +1,153 @@
+"""Which files a job has read, and whether they are still what they were: what decides if a job is done again.
+
+Nobody lists the files of an asset: a glTF names buffers, a URDF meshes, a stage layers. So the worker notes what
+Python opens while the job runs (an audit hook, which costs a comparison for each file), and libraries that open
+files themselves name theirs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypedDict
+
+from contact_core.cache import cache_directory
+
+_CODE = {".py", ".pyc", ".so", ".pyd", ".dll", ".nbi", ".nbc"}  # the version of the program, not of the job
+_WRITES = os.O_WRONLY | os.O_RDWR
+
+
+class Input(TypedDict):
+    """A file as a job read it. file: relative to the job's own file, where the drive is the same.
+
+    size, changed (ns): while both are the same the bytes are not read again. sha256: None for what was not there.
+    """
+
+    file: str
+    sha256: str | None
+    size: int
+    changed: int
+
+
+class _Notes(threading.local):
+    """What the job of this thread has opened; None outside a job."""
+
+    read: set[str] | None = None
+    written: set[str] | None = None
+
+
+_notes = _Notes()
+_installed = threading.Lock()
+_is_installed = False
+
+
+@contextmanager
+def noting_files() -> Iterator[set[str]]:
+    """Yields a set that holds, at the end, the real paths of the plain files that this thread has read inside.
+
+    What was written inside, what belongs to Python or to the cache, and what is gone again, is left out.
+    """
+    _install()
+    read, written, found = set[str](), set[str](), set[str]()
+    _notes.read, _notes.written = read, written
+    try:
+        yield found
+    finally:
+        _notes.read = _notes.written = None
+        own = set(map(os.path.realpath, written))
+        found.update(path for path in set(map(os.path.realpath, read)) - own if _is_input(path))
+
+
+def as_read(paths: Iterable[str | Path], beside: Path, digests: Digests) -> list[Input]:
+    """The files as they are now, sorted by name. beside: the job's own file."""
+    found = []
+    for path in sorted({os.path.realpath(path) for path in paths}):
+        size, changed = _stamp(path)
+        found.append(Input(file=_relative(path, beside), sha256=digests.of(path), size=size, changed=changed))
+    return found
+
+
+def first_change(inputs: Iterable[Mapping[str, Any]], beside: Path, digests: Digests) -> str | None:
+    """The first file that is not what it was when the job read it; None where all are."""
+    for known in inputs:
+        path = os.path.normpath(beside.absolute().parent / known["file"])
+        if _stamp(path) == (known["size"], known["changed"]):
+            continue
+        if digests.of(path) != known["sha256"]:
+            return path
+    return None
+
+
+class Digests:
+    """SHA-256 of files, each read once for as long as it does not change."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, int, int], str | None] = {}
+
+    def of(self, path: str) -> str | None:
+        """64 hex digits; None for what is no readable file."""
+        key = (path, *_stamp(path))
+        if key not in self._known:
+            try:
+                with Path(path).open("rb") as stream:
+                    self._known[key] = hashlib.file_digest(stream, "sha256").hexdigest()
+            except OSError:
+                self._known[key] = None
+        return self._known[key]
+
+
+def _stamp(path: str) -> tuple[int, int]:
+    """Size and time of the last change (ns) of a file; (-1, -1) for one that is not there."""
+    try:
+        status = Path(path).stat()
+    except (OSError, ValueError):
+        return -1, -1
+    return status.st_size, status.st_mtime_ns
+
+
+def _relative(path: str, beside: Path) -> str:
+    try:
+        return Path(os.path.relpath(path, beside.absolute().parent)).as_posix()
+    except ValueError:  # another drive
+        return path
+
+
+def _install() -> None:
+    """Audit hooks stay for the life of a process, so there is one."""
+    global _is_installed
+    with _installed:
+        if not _is_installed:
+            sys.addaudithook(_hear)
+            _is_installed = True
+
+
+def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    if event != "open" or _notes.read is None or _notes.written is None:
+        return
+    path, mode, flags = arguments
+    if isinstance(path, bytes | os.PathLike):
+        path = os.fsdecode(path)
+    if not isinstance(path, str):  # a descriptor
+        return
+    writes = bool(flags & _WRITES) if isinstance(flags, int) else any(letter in str(mode) for letter in "wax+")
+    (_notes.written if writes else _notes.read).add(path)
+
+
+def _is_input(path: str) -> bool:
+    if Path(path).suffix.lower() in _CODE or not Path(path).is_file():
+        return False
+    return not any(path.startswith(place + os.sep) for place in _elsewhere())
+
+
+def _elsewhere() -> Iterator[str]:
+    """Folders whose files are no inputs: Python's, the cache's, the system's."""
+    yield from {os.path.realpath(sys.prefix), os.path.realpath(sys.base_prefix)}
+    cache = cache_directory()
+    if cache is not None:
+        yield os.path.realpath(cache)
+    yield from ("/proc", "/sys", "/dev", "/etc")
