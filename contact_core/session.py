@@ -22,7 +22,7 @@ from contact_core.edit.open_macro import OpenMacro
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
 from contact_core.edit.under_way import UnderWay
-from contact_core.edit.verbs import ContactSets, Pairs, Patches
+from contact_core.edit.verbs import ContactSets, Film, Pairs, Patches
 from contact_core.errors import CommandRejected, FileRefused
 from contact_core.plugins.makers import PluginMakers
 from contact_core.plugins.registry import COMMANDS, GEODESIC_ENGINES
@@ -49,7 +49,7 @@ class Session(ProposingSession):
 
     patches: paint, move, bend, link, transfer. pairs: which patches are to touch. surfaces: meshes and rigs behind
     names. sets: save and load contacts. geometry: where everything is now; it reads and never edits. rigs: by
-    surface. host: the scene, None without.
+    surface. host: the scene, None without. timeline: keys, spans, and the frame that is shown.
 
     document: to start from, empty by default. host: the scene in which the document lives; surfaces that the
     document knows are bound to its objects at once, with their meshes and rigs. objects: ids or names of further
@@ -87,7 +87,7 @@ class Session(ProposingSession):
         self.makers = PluginMakers(lambda: self.plugins)
         self.geometry = DocumentGeometry(lambda: self.document, self._derived, self.rigs)
         self.patches, self.pairs, self.sets = Patches(self), Pairs(self), ContactSets(self)
-        self.surfaces = SceneSurfaces(self)
+        self.surfaces, self.timeline = SceneSurfaces(self), Film(self)
         if isinstance(engine, str):
             self._derived.engine = self.plugins.get(GEODESIC_ENGINES, engine)
         elif engine is not None:
@@ -237,7 +237,12 @@ class Session(ProposingSession):
 
     @property
     def document(self) -> ContactDocument:
-        """The document as it is now; within a macro, as the commands so far have made it."""
+        """The document as it is now, at the frame that is shown; within a macro, as the commands so far made it."""
+        return self.timeline.shown(self.timed_document)
+
+    @property
+    def timed_document(self) -> ContactDocument:
+        """The document with its tracks and spans; `document` is what it comes to at the frame that is shown."""
         return self._under_way.document or self.history.document
 
     @property
@@ -286,9 +291,21 @@ class Session(ProposingSession):
         """
         with self._under_way.alone():
             self._check_writable()
+            command = self.timeline.keyed(command)
             if self._under_way.macro is not None:
                 self._under_way.macro.do(command)
                 return
+            self._commit(command, origin, merge, keys)
+
+    def _commit(
+        self,
+        command: Command,
+        origin: str = "user",
+        merge: bool = False,
+        keys: Mapping[float, Mapping[str, Pose]] | None = None,
+    ) -> None:
+        """Do what `do` says of a command that keys what has tracks."""
+        with self._under_way.alone():
             host_keeps_steps = self._host_link is not None and self._host_link.has_undo
             if self._host_link is not None:
                 self._host_link.check_unchanged()
@@ -300,7 +317,7 @@ class Session(ProposingSession):
                 if self._file is not None:
                     self._file.did(step)
                 self.history.commit(step)
-            self._announcer.tell(DocumentChanged("do", before, step.after, step.revision, step.command, origin))
+            self._tell("do", before, step.after, step.command, origin)
 
     def set_extra(self, namespace: str, value: Any) -> None:
         """Keep JSON data of a host or a plugin in the document."""
@@ -344,9 +361,7 @@ class Session(ProposingSession):
                 self.history.goto(came_from)
                 raise
             command = step.command if step is not None else None
-            self._announcer.tell(
-                DocumentChanged(kind, before, self.history.document, self.revision, command, origin)
-            )
+            self._tell(kind, before, self.history.document, command, origin)
 
     def _record_move(self, before: ContactDocument, origin: str) -> None:
         """Tell host and journal where the history went, the host only when it was not the one who asked."""
@@ -364,7 +379,7 @@ class Session(ProposingSession):
             if self._file is not None:
                 with _warned():
                     self._file.restart(history)
-            self._announcer.tell(DocumentChanged("goto", before, self.document, self.revision, None, "host"))
+            self._tell("goto", before, self.history.document, None, "host")
 
     @contextlib.contextmanager
     def macro(self, title: str) -> Iterator[Session]:
@@ -383,7 +398,7 @@ class Session(ProposingSession):
                 self._under_way.macro = None
             command = macro.end()
             if command is not None:
-                self.do(command)
+                self._commit(command)
 
     @contextlib.contextmanager
     def stroke(self) -> Iterator[Stroke]:
@@ -438,15 +453,33 @@ class Session(ProposingSession):
             yield
             return
         with self._host_link.recording(label, after, revision):
-            self.binding.follow(before, after)
+            self.binding.follow(self.timeline.shown(before), self.timeline.shown(after))
             yield
 
     def _tell_plugins(self, change: DocumentChanged) -> None:
         """Plugins hear what is committed, from the first commit on, whether or not they were asked for before."""
-        if change.kind != "preview":
+        if change.kind not in ("preview", "frame"):
             self.plugins.notify(
                 "contact_document_changed", document=change.after, revision=change.revision, origin=change.origin
             )
+
+    def frame_changed(self, before: ContactDocument) -> None:
+        """Tell listeners that another frame is shown. before: the document at the frame before it."""
+        if self.document is not before:
+            change = DocumentChanged("frame", before, self.document, self.revision, None, "user")
+            self._announcer.tell(change)
+
+    def _tell(
+        self,
+        kind: Literal["do", "undo", "redo", "goto"],
+        before: ContactDocument,
+        after: ContactDocument,
+        command: Command | None,
+        origin: str,
+    ) -> None:
+        """Tell listeners what changed, at the frame that is shown."""
+        shown = self.timeline.shown(before), self.timeline.shown(after)
+        self._announcer.tell(DocumentChanged(kind, *shown, self.revision, command, origin))
 
     def _preview(self, start: ContactDocument, shown: ContactDocument) -> None:
         self._announcer.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))

@@ -13,6 +13,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -131,8 +132,8 @@ class PoseKey:
     """The pose of a rig at a frame.
 
     speeds: (j, 6) of the joints that the pose names, as in `rig.pose_keys.PoseKeys`; None: as the keys beside it
-    suggest. source: of a solved key the digest of what it was solved from (`document.staleness`), empty for one
-    that a person made: that one is a pin, and no solve moves it.
+    suggest. source: of a solved key the digest of what it was solved from (`staleness.motion_source`), empty for
+    one that a person made: that one is a pin, and no solve moves it.
     """
 
     json_union: ClassVar[bool] = True
@@ -234,8 +235,11 @@ class Track:
         return np.asarray(_pose_at(keys, frame).local[0])
 
     def pose_at(self, frame: float) -> Pose:
-        """The pose of a rig; at a key, the key's pose itself."""
-        return _pose_at(self.of(PoseKey), frame)
+        """The pose of a rig; at a key, the key's pose itself. Asked again for a frame, the very same."""
+        kept = _poses.get(self)
+        if kept is None or kept[0] != frame:
+            kept = _poses[self] = frame, _pose_at(self.of(PoseKey), frame)
+        return kept[1]
 
     def edited(self, keys: Iterable[Key] = (), gone: Iterable[float] = ()) -> Track | None:
         """With keys put in, in place of those at their frames, without those at `gone`; None: no key is left."""
@@ -252,6 +256,9 @@ class Track:
         if frame <= first.frame or first is second or first.interpolation == "hold":
             return first, first, 0.0
         return first, second, (frame - first.frame) / (second.frame - first.frame)
+
+
+_poses: WeakKeyDictionary[Track, tuple[float, Pose]] = WeakKeyDictionary()
 
 
 def _pose_at(keys: tuple[PoseKey, ...], frame: float) -> Pose:

@@ -16,13 +16,13 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DocumentChanged:
-    """What listeners are told. kind: "preview" comes during a stroke or shows the
-    ghost of a proposal; its revision is that of the start.
+    """What listeners are told. kind: "preview" comes during a stroke or shows the ghost of a proposal; its revision
+    is that of the start. "frame" says that another frame is shown. before, after: at the frame that is shown.
 
     command: the one done, undone or redone; None for a jump or a preview.
     """
 
-    kind: Literal["do", "undo", "redo", "goto", "preview"]
+    kind: Literal["do", "undo", "redo", "goto", "preview", "frame"]
     before: ContactDocument
     after: ContactDocument
     revision: int

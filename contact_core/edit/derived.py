@@ -73,6 +73,10 @@ class Derived:
         self._trace_ancestors(document, name)
         return self._root_and_cut(document, name)[0]
 
+    def walked(self, mesh: TriangleMesh, digest: str, walk: Walk) -> Root:
+        """Where a walk ends on a mesh with that content digest."""
+        return self._cached(("walk", digest, walk), 1, lambda: follow_walk(mesh, walk))
+
     def axis(self, document: ContactDocument, name: str) -> Axis:
         """The axis of a patch on its surface."""
         self._trace_ancestors(document, name)
@@ -127,8 +131,7 @@ class Derived:
             return link, 0.0
         if isinstance(link, Walk):
             walk, mesh = link, self.mesh(document, document.patch(name).surface)
-            surface = document.surface(document.patch(name).surface).digest
-            return self._cached(("root", surface, walk), 1, lambda: (follow_walk(mesh, walk), 0.0))
+            return self.walked(mesh, document.surface(document.patch(name).surface).digest, walk), 0.0
         key = ("root", self._axis_key(document, link.parent), link, self._shape_key(document, name))
         return self._cached(key, 1, lambda: self._linked_root(document, name, link))
 

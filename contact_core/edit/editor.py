@@ -50,6 +50,10 @@ class Editor(Protocol):
         """The document that verbs start from."""
 
     @property
+    def timed_document(self) -> ContactDocument:
+        """The document with its tracks and spans, of which `document` is a frame."""
+
+    @property
     def derived(self) -> Derived:
         """Reconstructed geometry, cached, and the meshes that were brought."""
 

@@ -48,6 +48,11 @@ class Stroke:
         return self._shown
 
     @property
+    def timed_document(self) -> ContactDocument:
+        """The same: a stroke is drawn at one frame."""
+        return self._start
+
+    @property
     def derived(self) -> Derived:
         """Reconstructed geometry, cached."""
         return self._derived

@@ -36,7 +36,7 @@ def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
     rows = table(job.metrics, job.verdict)
     with replacing_set(out, FILES.values()) as stage:
         with job.stage("write", 0.75, "Writing the document, the pose and the model"):
-            write_atomic(stage / FILES["document"], dump_document(job.session.document))
+            write_atomic(stage / FILES["document"], dump_document(job.session.timed_document))
             write_atomic(stage / FILES["pose"], pose_json(job.rig.name, job.pose))
             _write_model(job, stage / FILES["model"], plugins)
         with job.stage("render", 0.8, "Drawing the pictures"):

@@ -44,6 +44,11 @@ class Draft:
         return self._document
 
     @property
+    def timed_document(self) -> ContactDocument:
+        """The same: a draft is of one frame."""
+        return self._document
+
+    @property
     def derived(self) -> Derived:
         """Reconstructed geometry, cached."""
         return self._derived

@@ -8,10 +8,11 @@ from contact_core.edit.verbs.placing import PlacingVerbs
 from contact_core.edit.verbs.reshaping import ReshapingVerbs
 from contact_core.edit.verbs.sets import ContactSets
 from contact_core.edit.verbs.surfaces import Surfaces
+from contact_core.edit.verbs.timing import Film
 
 
 class Patches(BrushVerbs, GatheringVerbs, ReshapingVerbs, PlacingVerbs, OrganisingVerbs):
     """Everything that is done to patches."""
 
 
-__all__ = ["ContactSets", "Pairs", "Patches", "Surfaces"]
+__all__ = ["ContactSets", "Film", "Pairs", "Patches", "Surfaces"]

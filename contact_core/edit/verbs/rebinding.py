@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,12 +14,14 @@ from contact_core.contact.placement import Link, Placement, Root
 from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.document.document import Surface
 from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.timeline import Track, of_address
 from contact_core.edit.commands import RebindSurface
 from contact_core.edit.editor import Editor
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
+from contact_core.motion.placement_keys import PlacementKey, PlacementKeys
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,21 @@ def plan_rebind(editor: Editor, new: Surface, mesh: TriangleMesh) -> tuple[Rebin
         moves[name] = float(np.linalg.norm(points.points.positions(mesh) - before, axis=1).max(initial=0.0))
     placements = [(name, _placed(editor, name, mesh, axes)) for name in on_it]
     placements += _links_elsewhere(editor, new.name, shapes)
-    return RebindSurface(new, FrozenMap(shapes), tuple(placements)), RebindReport(moves)
+    tracks = placed_tracks(editor, new.name, mesh, lambda root: _projected_root(root, old_mesh, mesh))
+    return RebindSurface(new, FrozenMap(shapes), tuple(placements), tracks), RebindReport(moves)
+
+
+def placed_tracks(
+    editor: Editor, surface: str, mesh: TriangleMesh, moved: Callable[[Root], Root]
+) -> FrozenMap[Track]:
+    """The keys of places on a surface with other roots, and their ways over a mesh found anew."""
+    document, tracks = editor.timed_document, dict[str, Track]()
+    for where, track in document.tracks.items():
+        kind, name = of_address(where)
+        if kind == "placement" and document.patches[name].surface == surface:
+            keys = [(key.frame, moved(key.root), key.interpolation) for key in track.of(PlacementKey)]
+            tracks[where] = Track(PlacementKeys.of(mesh, keys).keys)
+    return FrozenMap(tracks)
 
 
 def _links_elsewhere(

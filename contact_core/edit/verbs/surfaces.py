@@ -19,7 +19,7 @@ from contact_core.edit.commands import (
     SetPose,
 )
 from contact_core.edit.verbs.group import VerbGroup
-from contact_core.edit.verbs.rebinding import RebindReport, plan_rebind
+from contact_core.edit.verbs.rebinding import RebindReport, placed_tracks, plan_rebind
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.rig.rig import Pose, Rig
@@ -71,7 +71,9 @@ class Surfaces(VerbGroup):
         if known is None:
             self._editor.do(AddSurface(wanted), origin="asset")
         elif known.digest != wanted.digest:
-            self._editor.do(RebindSurface(replace(known, digest=wanted.digest), FrozenMap(), ()), origin="asset")
+            tracks = placed_tracks(self._editor, name, mesh, lambda root: root)
+            same = replace(known, digest=wanted.digest)
+            self._editor.do(RebindSurface(same, FrozenMap(), (), tracks), origin="asset")
         return self._document.surface(name)
 
     def rebind(self, name: str, mesh: TriangleMesh, *, old_mesh: TriangleMesh | None = None) -> RebindReport:
