@@ -52,8 +52,12 @@ def random_document(seed: int, steps: int = 25) -> ContactDocument:
     return random_history(seed, steps).document
 
 
-def random_history(seed: int, steps: int) -> History:
-    """A history of at least three surfaces and patches, then random commands."""
+def random_history(seed: int, steps: int, *, still: bool = False) -> History:
+    """A history of at least three surfaces and patches, then random commands.
+
+    still: without keys, so that a session without meshes can do the commands: there an edit of what has keys
+    becomes a key, and for its way a mesh is wanted.
+    """
     rng = np.random.default_rng(seed)
     history = History(ContactDocument())
     for json_id in 3 * ["surface.add", "contact.paint"]:
@@ -62,7 +66,7 @@ def random_history(seed: int, steps: int) -> History:
         history.do(command)
     for _ in range(steps):
         command = random_command(history.document, rng)
-        if command is not None:
+        if command is not None and not (still and isinstance(command, kinds.SetKeys)):
             try_to_do(history, command)
     return history
 

@@ -52,7 +52,7 @@ def crashed(
 ) -> tuple[Path, ContactDocument]:
     """A folder as a killed session left it, with edits that were never saved, and the document that it had."""
     path = tmp_path_factory.mktemp("crashed") / "document.json"
-    steps = random_history(5, 14).steps
+    steps = random_history(5, 14, still=True).steps
     session = Session.open(path, discover=False)
     for number, step in enumerate(steps):
         session.do(step.command)
@@ -174,7 +174,7 @@ def test_after_a_damaged_line_the_saved_file_is_where_to_begin(tmp_path: Path) -
     """Nothing is lost but the steps to undo: the file holds what the lost line led to."""
     path = tmp_path / "document.json"
     session = Session.open(path, discover=False)
-    history = random_history(3, 12).steps
+    history = random_history(3, 12, still=True).steps
     for step in history[:8]:
         session.do(step.command)
     session.save()

@@ -29,7 +29,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="needs fork, SIGKILL and r
 
 def fill(session: Session, seed: int, steps: int = 40) -> None:
     """Commit a random history in a session."""
-    for step in random_history(seed, steps).steps:
+    for step in random_history(seed, steps, still=True).steps:
         session.do(step.command)
 
 
