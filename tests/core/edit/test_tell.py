@@ -19,7 +19,7 @@ from contact_core.testing.random_commands import random_history
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_a_diff_is_empty_exactly_when_documents_are_equal(seed: int) -> None:
-    for step in random_history(seed, 25).steps:
+    for step in random_history(seed, 25, still=True).steps:
         told = list(changes(step.before, step.after))
         same = dump_document(step.before) == dump_document(step.after)
         assert (told == []) == same, (step.command.label(), told)
@@ -46,7 +46,7 @@ def test_edits_are_told_in_words(session: Session) -> None:
 def test_history_and_replay_read_the_journal(tmp_path: Path) -> None:
     path = tmp_path / "document.json"
     session = Session.open(path, discover=False)
-    for step in random_history(3, 8).steps:
+    for step in random_history(3, 8, still=True).steps:
         session.do(step.command, origin="script" if step.revision == 2 else "user")
     session.undo()
     session.save()
@@ -78,7 +78,7 @@ def test_titles_send_nothing_to_the_terminal_but_text(tmp_path: Path) -> None:
 def test_a_damaged_journal_is_told(tmp_path: Path) -> None:
     path = tmp_path / "document.json"
     session = Session.open(path, discover=False)
-    for step in random_history(3, 8).steps:
+    for step in random_history(3, 8, still=True).steps:
         session.do(step.command)
     session.close(discard=True)
     beside = path.with_name("document.json.journal")
