@@ -183,7 +183,7 @@ def test_every_library_has_its_licence_in_the_table() -> None:
         extra: {name.strip().lower() for cell, of in rows if of == extra for name in cell.split(",")}
         for _, extra in rows
     }
-    for extra in ("io", "solvers", "samples", "viewer", "usd", "blender", "engines", "testing"):
+    for extra in ("io", "solvers", "samples", "viewer", "app", "usd", "blender", "engines", "testing"):
         assert required(extra) <= told[extra], extra
     assert required(None) <= told["core"]
 

@@ -8,3 +8,13 @@ from contact_core.plugins import hookimpl
 @hookimpl
 def contact_renderers() -> list[object]:
     return ["contact_viewer.renderer:PyVistaRenderer"]
+
+
+@hookimpl
+def contact_hosts() -> list[object]:
+    return ["contact_viewer.host:ViewerHost"]
+
+
+@hookimpl
+def contact_cli() -> list[object]:
+    return ["contact_viewer.command:ViewCommand"]

@@ -1,0 +1,381 @@
+"""The application without its window: a session, its interaction, a canvas, and what the front end's own actions
+do.
+
+A front end gives `handle` its events and calls `frame` before it draws. Everything here is for one thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from contact_core.errors import ContactError, FileRefused, InvalidInput
+from contact_core.interaction.actions import Action, action_of
+from contact_core.interaction.events import Event, Pointer
+from contact_core.interaction.interaction import Interaction
+from contact_core.opening import DOCUMENT_SUFFIX
+from contact_core.plugins.manager import PluginManager
+from contact_core.scene.memory_scene import save_scene
+from contact_core.session import Session
+from contact_viewer import files, panel
+from contact_viewer.canvas import Canvas
+from contact_viewer.drawer import Drawer
+from contact_viewer.host import ViewerHost
+from contact_viewer.look import THEMES, from_hex
+from contact_viewer.navigation import Navigation
+from contact_viewer.recovery import Recovery
+
+_SIDES = {"view.front": "front", "view.side": "right", "view.top": "top"}
+
+
+class Application:
+    """What an artist has before them.
+
+    sources: as for `files.open_files`. notes: sentences on what opening found, and what the last action did.
+    """
+
+    def __init__(
+        self,
+        canvas: Canvas,
+        sources: Sequence[str] = (),
+        plugins: PluginManager | None = None,
+        *,
+        state_folder: Path | None = None,
+    ) -> None:
+        self.canvas = canvas
+        self.plugins = plugins or PluginManager()
+        self.notes: list[str] = []
+        self.help_wanted = False
+        self.wants: str | None = None  # "open" or "export": a file that the artist is to name
+        self.timeline = 0.0  # frame at which poses are keyed
+        self._state_folder = state_folder
+        self._path: Path | None = None
+        self._session: Session | None = None
+        self._interaction: Interaction | None = None
+        self._navigation = Navigation(canvas.eye)
+        self._camera_moved = True
+        self._told = False
+        self._meets: list[panel.Residual] = []
+        self.open(list(sources))
+
+    # -- what is edited ------------------------------------------------------------------------------------------
+
+    @property
+    def session(self) -> Session:
+        """What is edited now."""
+        assert self._session is not None  # `open` in the constructor made one
+        return self._session
+
+    @property
+    def interaction(self) -> Interaction:
+        """What the artist does in it."""
+        assert self._interaction is not None
+        return self._interaction
+
+    def open(self, sources: Sequence[str]) -> None:
+        """Go on with other files; what was not saved of them before comes back. Raises FileRefused, and then
+        everything stays as it is."""
+        recovery = Recovery(sources or files.START, self._state_folder)
+        found = recovery.found()
+        try:
+            session = files.open_files(sources, self.plugins, found)
+        except ContactError:
+            if found is None:
+                raise
+            session = files.open_files(sources, self.plugins)  # what was kept belongs to other meshes
+            found = None
+        self._let_go()
+        self._recovery = recovery
+        self._take(session)
+        self._path = Path(sources[0]) if len(sources) == 1 and Path(sources[0]).is_file() else None
+        self.notes = list(session.notes)
+        if found is not None:
+            self.notes.append("what was not saved the last time is back.")
+
+    def add(self, sources: Sequence[str | Path]) -> None:
+        """Bring further meshes and rigs into the scene. Raises FileRefused."""
+        names = files.add_files(self.session, sources)
+        self.say(f"{', '.join(names)} stands beside the rest now.")
+        self.see_all()
+
+    def _take(self, session: Session) -> None:
+        meters = 1.0
+        if session.host is not None:
+            meters = session.host.space().meters_per_unit
+            self.canvas.eye.up = session.host.space().up_axis
+        if isinstance(session.host, ViewerHost):
+            session.host.canvas = self.canvas
+        self._session = session
+        self._interaction = Interaction(session, meters_per_unit=meters)
+        self._recovery.follow(session)
+        self.drawer = Drawer(self._interaction, self.canvas)
+        self.canvas.keep_surfaces(())
+        self.see_all()
+
+    def _let_go(self) -> None:
+        if self._interaction is not None:
+            self._interaction.close()
+        if self._session is not None:
+            self._session.close()
+
+    def close(self) -> None:
+        """The end: what was not saved is kept for the next time."""
+        self._let_go()
+
+    # -- events --------------------------------------------------------------------------------------------------
+
+    def handle(self, event: Event) -> None:
+        """Give an event to the tool, then to the camera and to the application's own actions.
+
+        What is refused stands in `line`.
+        """
+        if self.interaction.handle(event, self.canvas.eye):
+            return
+        if isinstance(event, Pointer):
+            self._camera_moved |= self._navigation.handle(event)
+            return
+        action = action_of(event, self.interaction.actions)
+        if action is not None and action.by_host:
+            self.do(action.id)
+
+    def do(self, action: str) -> None:
+        """Do an action of the table by its id; what is refused stands in `line`."""
+        known = {each.id: each for each in self.interaction.actions}
+        try:
+            if action not in known:
+                raise InvalidInput(f"there is no action {action!r}.")
+            if known[action].by_host:
+                self.notes.clear()
+                self._own(action)
+            else:
+                self.interaction.do(action)
+        except ContactError as error:
+            self.say(str(error))
+
+    def _own(self, action: str) -> None:
+        own: dict[str, Callable[[], object]] = {
+            "show.help": lambda: setattr(self, "help_wanted", not self.help_wanted),
+            "file.open": lambda: setattr(self, "wants", "open"),
+            "file.export": lambda: setattr(self, "wants", "export"),
+            "file.save": self.save,
+            "pose.key": self.key_pose,
+            "pose.next": lambda: self.step_key(+1),
+            "pose.previous": lambda: self.step_key(-1),
+            "view.home": self.see_all,
+            "view.selection": self.see_selection,
+        }
+        if action in _SIDES:
+            self.canvas.eye.look_from(_SIDES[action])
+            self._camera_moved = True
+        elif action in own:
+            own[action]()
+
+    def refusal(self) -> str:
+        """What was refused last, "" where nothing was."""
+        return self.interaction.status.refusal or self._recovery.failure
+
+    def attempt(self, act: Callable[[], object]) -> None:
+        """Do something; what is refused stands in `line`."""
+        try:
+            self.notes.clear()
+            act()
+        except ContactError as error:
+            self.say(str(error))
+
+    # -- files ---------------------------------------------------------------------------------------------------
+
+    @property
+    def title(self) -> str:
+        """What is open, for the title of a window."""
+        name = self._path.name if self._path is not None else "untitled"
+        return f"{name}{'' if self.session.history.is_clean else ' •'}"
+
+    def save(self, path: Path | str | None = None) -> None:
+        """Save where it came from, or at a path. Raises FileRefused."""
+        target = None if path is None else Path(path)
+        if target is None and isinstance(self.session.host, ViewerHost) and self.session.host.path is None:
+            target = self._free_path()
+        saved = files.save(self.session, target)
+        self._path = saved
+        self._recovery.forget()
+        self.say(f"saved {saved}.")
+
+    def _free_path(self) -> Path:
+        """A file beside the one that was opened, or here, that does not exist."""
+        folder = self._path.parent if self._path is not None else Path.cwd()
+        stem = self._path.stem if self._path is not None else "contacts"
+        for number in range(1, 10_000):
+            path = folder / f"{stem}{'' if number == 1 else f'-{number}'}{files.SCENE_SUFFIX}"
+            if not path.exists():
+                return path
+        raise FileRefused(f"{folder} is full of files called {stem}: save under a name.")
+
+    def write(self, path: Path) -> None:
+        """Save under another name, or export, as the suffix says. Raises FileRefused."""
+        if path.suffix.lower() in (files.SCENE_SUFFIX, DOCUMENT_SUFFIX):
+            self.save(path)
+        else:
+            self.export(path)
+
+    def write_copy(self, path: Path) -> None:
+        """Write the scene or an export somewhere, and go on as before. Raises FileRefused."""
+        host = self.session.host
+        if path.suffix.lower() == files.SCENE_SUFFIX and isinstance(host, ViewerHost):
+            save_scene(host.scene, path)
+        else:
+            files.export(self.session, path)
+
+    def export(self, path: Path | str) -> None:
+        """Write the posed scene. Raises FileRefused."""
+        files.export(self.session, Path(path))
+        self.say(f"wrote {path}.")
+
+    # -- what is seen --------------------------------------------------------------------------------------------
+
+    def see_all(self) -> None:
+        """Bring everything into view."""
+        self.canvas.eye.fit(self.drawer.points())
+        self._camera_moved = True
+
+    def see_selection(self) -> None:
+        """Bring the selected patches into view, everything where none is."""
+        points = self.drawer.points(self.interaction.selection.patches)
+        self.canvas.eye.fit(points, margin=3.0 if self.interaction.selection.patches else 1.12)
+        self._camera_moved = True
+
+    def set_theme(self, name: str) -> None:
+        """dark or light."""
+        self.canvas.set_theme(THEMES[name])
+        self.drawer.stale = True
+
+    def hide(self, kind: str, name: str) -> None:
+        """Hide a surface or a patch, or show it again."""
+        hidden = self.drawer.hidden_surfaces if kind == "surface" else self.drawer.hidden_patches
+        hidden.symmetric_difference_update({name})
+        self.drawer.stale = True
+
+    def select(self, kind: str, name: str, *, more: bool = False) -> None:
+        """Select from the tree: a patch (more: beside those selected), or the surface that tools work on."""
+        if kind == "surface":
+            now = self.interaction.selection
+            surface = None if now.surface == name else name
+            if surface is None:
+                self.interaction.do("selection.none")
+            else:
+                self.interaction.select(*now.patches, surface=surface)
+            return
+        chosen = self.interaction.selection.patches
+        kept = tuple(each for each in chosen if each != name) if more else ()
+        self.interaction.select(*(kept if more and name in chosen else (*kept, name)))
+
+    def rename(self, patch: str, name: str) -> None:
+        """Give a patch another name. Raises ContactError."""
+        if name and name != patch:
+            self.session.patches.rename(patch, name)
+
+    def recolor(self, patch: str, color: str) -> None:
+        """Give a patch another colour, "#rrggbb"; its partners follow, so that pairs stay recognisable."""
+        document = self.session.document
+        together = {patch, *document.partners(patch)}
+        for pair in document.pairs.values():
+            if {pair.manipulator, pair.object} & together:
+                together |= {pair.manipulator, pair.object}
+        try:
+            self.session.patches.recolor(sorted(together), from_hex(color))
+        except ValueError as error:
+            raise InvalidInput(str(error)) from None
+
+    # -- pose keys -----------------------------------------------------------------------------------------------
+
+    @property
+    def keys(self) -> tuple[float, ...]:
+        """Frames with a pose key of any hand."""
+        host, found = self.session.host, set()
+        for name, bound in self.session.binding.surfaces.items():
+            if name in self.session.rigs and hasattr(host, "pose_keys"):
+                found.update(host.pose_keys(bound.object_id))
+        return tuple(sorted(found))
+
+    def key_pose(self, frame: float | None = None) -> None:
+        """Key the pose of every hand at a frame, the current one by default. Raises FileRefused."""
+        at = self.timeline if frame is None else float(frame)
+        poses = dict(self.session.document.poses)
+        if self.session.host is None or not poses:
+            raise InvalidInput("there is no pose to key yet: solve first.")
+        with self.session.host.step(f"Key frame {at:g}"):
+            self.session.binding.write(poses, at)
+        self.timeline = at
+        self.say(f"keyed the pose at frame {at:g}.")
+
+    def step_key(self, by: int) -> None:
+        """Go to the next pose key, or the one before. Raises InvalidInput."""
+        keys = self.keys
+        beyond = [frame for frame in keys if (frame > self.timeline if by > 0 else frame < self.timeline)]
+        if not beyond:
+            raise InvalidInput(f"there is no pose key {'after' if by > 0 else 'before'} frame {self.timeline:g}.")
+        self.go_to(beyond[0] if by > 0 else beyond[-1])
+
+    def go_to(self, frame: float) -> None:
+        """Pose every hand as it is at a frame, as one step."""
+        self.timeline = float(frame)
+        if not self.keys:
+            return
+        there = self.session.binding.read(self.session.document, self.timeline)
+        moved = {n: p for n, p in there.poses.items() if self.session.document.poses.get(n) is not p}
+        if moved:
+            with self.session.macro(f"Go to frame {frame:g}"):
+                for name, pose in moved.items():
+                    self.session.surfaces.set_pose(name, pose)
+
+    # -- frames --------------------------------------------------------------------------------------------------
+
+    def frame(self) -> frozenset[str]:
+        """Do what is due, once before each frame: returns what changed, "camera" among it; empty for nothing, so
+        that nothing has to be drawn."""
+        self.interaction.advance()
+        parts = self.drawer.follow()
+        if {"document", "surfaces"} & parts:
+            self._meets = panel.residuals(self.session, self.interaction.desk.scene, self.interaction.desk.document)
+        if self._camera_moved:
+            parts |= {"camera"}
+        if self._told:
+            parts |= {"status"}
+        self._camera_moved = self._told = False
+        return parts
+
+    @property
+    def meets(self) -> list[panel.Residual]:
+        """How well each pair meets in what is shown, the worst first."""
+        return self._meets
+
+    def line(self) -> str:
+        """The line of status: what the tool does, and what was done last."""
+        status = replace(self.interaction.status, refusal="", work=None)
+        return " · ".join([status.line(), *self.notes])
+
+    def tree(self) -> list[dict[str, Any]]:
+        """The rows of the tree."""
+        return panel.tree(
+            self.session, self.interaction, self._meets, self.drawer.hidden_surfaces, self.drawer.hidden_patches
+        )
+
+    def table(self) -> tuple[Action, ...]:
+        """Actions and keys."""
+        return self.interaction.actions
+
+    def undo_name(self) -> str:
+        """What undo would take back; "" for nothing."""
+        done = self.session.history.done
+        return done[-1].command.label() if done else ""
+
+    def redo_name(self) -> str:
+        """What redo would do again; "" for nothing."""
+        history = self.session.history
+        return history.steps[len(history.done)].command.label() if history.can_redo else ""
+
+    def say(self, sentence: str) -> None:
+        """Let a sentence stand in the line of status."""
+        self.notes = [sentence]
+        self._told = True

@@ -1,0 +1,541 @@
+"""What is drawn: surfaces with their skins, filled contacts on them, and above all that lines, dots and words.
+
+Everything is overwritten in place, and one `render` shows it. The cost in software OpenGL lies in pixels, lights
+and samples (measured: an empty frame 9 ms, a hand 2.5, 69k faces 17; eight samples three times all of it), so there
+are two lights, and edges are smoothed only in the frame that stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.document.document import Color
+from contact_core.interaction.overlay import (
+    AxisLine,
+    BrushRing,
+    Decal,
+    Ghost,
+    Handle,
+    Label,
+    Overlay,
+    PairLine,
+    StrokeTint,
+)
+from contact_viewer.buffers import Polygons
+from contact_viewer.eye import Eye
+from contact_viewer.gl import is_software
+from contact_viewer.look import DARK, Theme, darker
+
+GHOST = 0.32  # opacity of a surface that one looks through
+_LIGHTS = (((-0.45, 0.7, 0.9), 0.82), ((0.6, -0.2, 0.8), 0.40))
+_SAMPLES = 8  # for a pixel of a frame that stands still
+_HIDDEN = 0.35  # opacity of a line where something lies before it
+_SEAM: Color = (0.05, 0.05, 0.06)  # round lines, so that they show on what is light as well
+_ARROW = 9.0  # pixels, the head of an arrow
+_RING = np.stack([np.cos(np.linspace(0, 2 * np.pi, 49)), np.sin(np.linspace(0, 2 * np.pi, 49))], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line through points (n, 3), world. width: pixels of a plain screen."""
+
+    points: FloatArray
+    color: Color
+    width: float = 2.0
+    opacity: float = 1.0
+
+    def faded(self, by: float) -> Line:
+        """The same, more of it shining through."""
+        return replace(self, opacity=self.opacity * by)
+
+
+class Canvas:
+    """Draws in a vtkRenderWindow. `eye` is its camera."""
+
+    def __init__(self, window: Any, *, up: str = "Y", theme: Theme = DARK) -> None:
+        from vtkmodules.vtkRenderingCore import vtkRenderer
+
+        self.window = window
+        self._base, self._above = vtkRenderer(), vtkRenderer()
+        window.SetNumberOfLayers(2)
+        window.AddRenderer(self._base)
+        self._above.SetLayer(1)
+        self._above.InteractiveOff()
+        window.AddRenderer(self._above)
+        self._above.SetActiveCamera(self._base.GetActiveCamera())
+        self._base.SetAutomaticLightCreation(False)
+        self._base.SetGradientBackground(True)
+        _light(self._base)
+        self.eye = Eye(self._base, up=up)
+        self._surfaces: dict[str, SurfaceActor] = {}
+        self._fills: dict[str, FillActor] = {}
+        self._lines = LineActors(self._base, in_front=True)  # where nothing lies before them
+        self._hidden = LineActors(self._above)  # and through everything, faintly
+        self._dots = DotActors(self._above)
+        self._words = WordActors(self._above)
+        self._texts = CornerTexts(self._above)
+        self._software: bool | None = None
+        self._stroke_table: tuple[Any, Any] | None = None
+        self.theme = theme
+        self.set_theme(theme)
+
+    def set_theme(self, theme: Theme) -> None:
+        """Other colours behind the scene and of words."""
+        self.theme = theme
+        self._base.SetBackground(*theme.bottom)
+        self._base.SetBackground2(*theme.top)
+        self._words.shade = theme.bottom
+        self._texts.set_theme(theme)
+
+    def write(self, top: str, bottom: str, middle: str = "") -> None:
+        """Lines of text at the top and the bottom, and a table over the middle; for windows without panels."""
+        self._texts.write(top, bottom, middle, self.eye)
+
+    # -- what is shown -------------------------------------------------------------------------------------------
+
+    def surface(self, name: str) -> SurfaceActor:
+        """The surface of that name, made at the first call."""
+        if name not in self._surfaces:
+            self._surfaces[name] = SurfaceActor(self._base)
+        return self._surfaces[name]
+
+    def keep_surfaces(self, names: Iterable[str]) -> None:
+        """Take every surface away but these."""
+        for name in set(self._surfaces) - set(names):
+            self._surfaces.pop(name).remove()
+
+    def show(self, overlay: Overlay) -> None:
+        """Draw an overlay in place of the one before; arrays that are the very same cost nothing."""
+        fills: dict[str, Decal | Ghost] = {decal.patch: decal for decal in overlay.decals if len(decal.triangles)}
+        fills |= {f"ghost {k}": ghost for k, ghost in enumerate(overlay.ghosts)}
+        for name in set(self._fills) - set(fills):
+            self._fills.pop(name).remove()
+        for name, fill in fills.items():
+            if name not in self._fills:
+                self._fills[name] = FillActor(self._base)
+            self._fills[name].show(fill, self.eye.pixel_ratio)
+        self._tint(overlay.tint)
+        lines = [line for axis in overlay.axes for line in self._axis(axis)]
+        seams = [Line(line.points, _SEAM, line.width + 2.0, 0.7) for line in lines]
+        pairs = [line for pair in overlay.pair_lines for line in _pair(pair)]
+        rings = [_ring(ring) for ring in overlay.rings]
+        ratio = self.eye.pixel_ratio
+        self._lines.show([*seams, *lines, *rings], ratio)
+        self._hidden.show([*(line.faded(_HIDDEN) for line in lines), *pairs, *rings], ratio)
+        loose = [decal for decal in overlay.decals if not len(decal.triangles)]
+        self._dots.show(overlay.handles, loose, ratio)
+        self._words.show(overlay.labels, ratio)
+
+    def _axis(self, axis: AxisLine) -> list[Line]:
+        """An axis as lines: itself, and the head of its arrow."""
+        if len(axis.points) < 2:
+            return []
+        parts = [axis.points]
+        if axis.arrow:
+            parts.append(self._arrow(axis.points))
+        return [Line(part, axis.color, axis.width) for part in parts]
+
+    def _arrow(self, points: FloatArray) -> FloatArray:
+        """(3, 3) the two sides of the head at the end of a line, in the plane that faces the eye."""
+        tip = points[-1]
+        back = points[:-1] - tip
+        size = _ARROW * self.eye.pixel_ratio * self.eye.pixel_size(tip)
+        far = np.flatnonzero(np.linalg.norm(back, axis=1) >= size)
+        along = back[far[-1]] if len(far) else back[0]
+        length = np.linalg.norm(along)
+        along = along / length if length else np.zeros(3)
+        across = np.cross(along, self.eye.direction)
+        return np.stack([tip + size * (along + 0.6 * across), tip, tip + size * (along - 0.6 * across)])
+
+    def _tint(self, tint: StrokeTint | None) -> None:
+        """Colour what a stroke has covered."""
+        for name, surface in self._surfaces.items():
+            if tint is None or tint.surface != name:
+                surface.set_values(None)
+            else:
+                surface.set_values(np.minimum(tint.distances, 4 * tint.radius), self._table(tint, surface.color))
+
+    def _table(self, tint: StrokeTint, beyond: Color) -> Any:
+        """The colour of a stroke up to its radius, and of the surface beyond."""
+        from vtkmodules.vtkCommonCore import vtkLookupTable
+
+        key = (tint.color, tint.radius, beyond, tint.erases)
+        if self._stroke_table is None or self._stroke_table[0] != key:
+            table = vtkLookupTable()
+            table.SetNumberOfTableValues(256)
+            table.SetTableRange(0.0, 2.0 * tint.radius)
+            inside = self.theme.quiet if tint.erases else tint.color
+            for k in range(256):
+                table.SetTableValue(k, *(inside if k < 128 else beyond), 1.0)
+            self._stroke_table = (key, table)
+        return self._stroke_table[1]
+
+    # -- drawing -------------------------------------------------------------------------------------------------
+
+    @property
+    def software(self) -> bool:
+        """Whether the processor draws; known after the first frame."""
+        if self._software is None:
+            self.window.Render()
+            self._software = is_software(self.window)
+        return self._software
+
+    def render(self, *, still: bool = False) -> None:
+        """Draw one frame. still: nothing is on the move, so edges may be smoothed at leisure."""
+        samples = _SAMPLES if still or self._software is False else 0
+        if self.window.GetMultiSamples() != samples:
+            self.window.SetMultiSamples(samples)
+        self.eye.clip()
+        self._words.place(self.eye)
+        self.window.Render()
+
+    def image(self, *, still: bool = False) -> Any:
+        """(h, w, 3) uint8 of a new frame, from its top row downwards."""
+        return self.rgba(still=still)[..., :3]
+
+    def rgba(self, *, still: bool = False) -> Any:
+        """(h, w, 4) uint8 of a new frame; its last channel says nothing."""
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+        self.render(still=still)
+        width, height = self.eye.viewport
+        pixels = vtkUnsignedCharArray()
+        self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, pixels)
+        return np.ascontiguousarray(vtk_to_numpy(pixels).reshape(height, width, 4)[::-1])
+
+    def resize(self, width: int, height: int) -> None:
+        """Draw so many pixels from now on."""
+        self.window.SetSize(max(10, width), max(10, height))
+
+    def close(self) -> None:
+        """Let go of what the graphics driver holds."""
+        self.window.Finalize()
+
+
+class SurfaceActor:
+    """One surface: points and normals by `set_shape`, how it looks by `set_look`."""
+
+    def __init__(self, renderer: Any) -> None:
+        from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+        self._renderer, self._polygons = renderer, Polygons()
+        self._mapper = vtkPolyDataMapper()
+        self._mapper.SetInputData(self._polygons.data)
+        self._mapper.ScalarVisibilityOff()
+        self._actor = vtkActor()
+        self._actor.SetMapper(self._mapper)
+        look = self._actor.GetProperty()
+        look.SetInterpolationToPhong()
+        look.SetAmbient(0.20)
+        look.SetDiffuse(0.86)
+        look.SetSpecular(0.10)
+        look.SetSpecularPower(22)
+        self._faces: Any = None
+        self._points: Any = None
+        self.color: Color = (0.7, 0.7, 0.7)
+        renderer.AddActor(self._actor)
+
+    def set_shape(self, points: FloatArray, faces: IntArray, normals: FloatArray) -> None:
+        """Points and normals (n, 3) and faces (m, 3) in the surface's own space; the very same arrays as before
+        cost nothing."""
+        if points is not self._points:
+            self._points = points
+            self._polygons.set_points(points)
+            self._polygons.set_normals(normals)
+        if faces is not self._faces:
+            self._faces = faces
+            self._polygons.set_faces(faces)
+
+    def set_place(self, world_from_surface: FloatArray) -> None:
+        """Where it stands (4, 4)."""
+        self._actor.SetUserMatrix(_matrix(world_from_surface))
+
+    def set_look(self, color: Color, *, opacity: float = 1.0, visible: bool = True) -> None:
+        """Its colour, and how much of what is behind shows through."""
+        self.color = color
+        look = self._actor.GetProperty()
+        look.SetColor(*color)
+        look.SetOpacity(opacity)
+        look.SetBackfaceCulling(opacity < 1.0)  # one layer of a ghost: nothing has to be sorted
+        self._actor.SetVisibility(visible)
+
+    def set_values(self, values: FloatArray | None, table: Any = None) -> None:
+        """Colour each point by a number (n,) and a vtkLookupTable; None: its one colour again."""
+        self._mapper.SetScalarVisibility(values is not None)
+        if values is None:
+            return
+        self._polygons.set_values(values)
+        self._mapper.SetLookupTable(table)
+        self._mapper.UseLookupTableScalarRangeOn()
+        self._mapper.InterpolateScalarsBeforeMappingOn()  # a sharp rim also across large faces
+
+    def remove(self) -> None:
+        """Draw it no more."""
+        self._renderer.RemoveActor(self._actor)
+
+
+class FillActor:
+    """One contact: filled triangles that win over the surface beneath, and their rim."""
+
+    def __init__(self, renderer: Any) -> None:
+        from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+        self._renderer = renderer
+        self._shown: Decal | Ghost | None = None
+        self._ratio = 0.0
+        self._ends: IntArray = np.zeros((0, 2), np.int64)
+        self._face, self._rim = Polygons(), Polygons()
+        self._actors = []
+        for polygons, units in ((self._face, -60.0), (self._rim, -110.0)):
+            mapper = vtkPolyDataMapper()
+            mapper.SetInputData(polygons.data)
+            mapper.SetResolveCoincidentTopologyToPolygonOffset()
+            mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-2.5, units)
+            mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2.5, units)
+            mapper.ScalarVisibilityOff()
+            actor = vtkActor()
+            actor.SetMapper(mapper)
+            renderer.AddActor(actor)
+            self._actors.append(actor)
+        face, rim = (actor.GetProperty() for actor in self._actors)
+        face.SetAmbient(0.42)
+        face.SetDiffuse(0.66)
+        face.SetSpecular(0.04)
+        face.SetInterpolationToGouraud()
+        rim.LightingOff()
+
+    def show(self, fill: Decal | Ghost, ratio: float) -> None:
+        """Draw another shape or look."""
+        if fill is self._shown and ratio == self._ratio:
+            return
+        before, self._shown, self._ratio = self._shown, fill, ratio
+        self._face.set_points(fill.points)
+        self._face.set_normals(_normals(fill.points, fill.triangles))
+        if before is None or before.triangles is not fill.triangles:
+            self._face.set_faces(fill.triangles)
+            self._ends = _rim(fill.triangles)
+            self._rim.set_lines(np.full(len(self._ends), 2))
+        self._rim.set_points(fill.points[self._ends.ravel()])
+        chosen = isinstance(fill, Decal) and fill.selected
+        face, rim = (actor.GetProperty() for actor in self._actors)
+        face.SetColor(*fill.color)
+        face.SetOpacity(fill.opacity)
+        rim.SetColor(*((1.0, 1.0, 1.0) if chosen else darker(fill.color)))
+        rim.SetLineWidth((2.6 if chosen else 1.6) * ratio)
+
+    def remove(self) -> None:
+        """Draw it no more."""
+        for actor in self._actors:
+            self._renderer.RemoveActor(actor)
+
+
+class LineActors:
+    """All lines of one width are one actor. in_front: on a surface they win over it."""
+
+    def __init__(self, renderer: Any, *, in_front: bool = False) -> None:
+        self._renderer, self._in_front = renderer, in_front
+        self._of_width: dict[float, tuple[Polygons, Any]] = {}
+
+    def show(self, lines: Sequence[Line], ratio: float) -> None:
+        """Draw these and no others."""
+        groups: dict[float, list[Line]] = {}
+        for line in lines:
+            groups.setdefault(line.width, []).append(line)
+        for width in set(self._of_width) - set(groups):
+            self._renderer.RemoveActor(self._of_width.pop(width)[1])
+        for width in sorted(groups, reverse=True):
+            group = groups[width]
+            if width not in self._of_width:
+                self._of_width[width] = _unlit(self._renderer, -200.0 if self._in_front else 0.0)
+            polygons, actor = self._of_width[width]
+            polygons.set_points(np.concatenate([line.points for line in group]))
+            polygons.set_lines(np.array([len(line.points) for line in group]))
+            polygons.set_colors(np.array([(*line.color, line.opacity) for line in group]), of="cells")
+            actor.GetProperty().SetLineWidth(width * ratio)
+
+
+class DotActors:
+    """All dots of one radius are one actor."""
+
+    def __init__(self, renderer: Any) -> None:
+        self._renderer = renderer
+        self._of_radius: dict[float, tuple[Polygons, Any]] = {}
+
+    def show(self, handles: Sequence[Handle], loose: Sequence[Decal], ratio: float) -> None:
+        """Draw these handles, each on a darker disk so that it shows on its own colour, and patches whose points
+        span no triangle."""
+        groups: dict[float, list[tuple[FloatArray, Color]]] = {}
+        for handle in handles:
+            groups.setdefault(handle.radius - 0.5, []).append((handle.position, darker(handle.color, 0.25)))
+            groups.setdefault(handle.radius - 2.0, []).append((handle.position, handle.color))
+        for decal in loose:
+            groups.setdefault(3.0, []).extend((point, decal.color) for point in decal.points)
+        for radius in set(self._of_radius) - set(groups):
+            self._renderer.RemoveActor(self._of_radius.pop(radius)[1])
+        for radius in sorted(groups, reverse=True):
+            if radius not in self._of_radius:
+                self._of_radius[radius] = _unlit(self._renderer, 30.0 * radius - 600.0)  # the smaller in front
+            polygons, actor = self._of_radius[radius]
+            polygons.set_points(np.array([point for point, _ in groups[radius]], float).reshape(-1, 3))
+            polygons.set_dots(len(groups[radius]))
+            polygons.set_colors(np.array([(*color, 1.0) for _, color in groups[radius]]), of="points")
+            actor.GetProperty().SetPointSize(2 * radius * ratio)
+
+
+class WordActors:
+    """Texts, of which as many actors are kept as were ever shown at once."""
+
+    def __init__(self, renderer: Any) -> None:
+        self._renderer = renderer
+        self._actors: list[Any] = []
+        self._words: Sequence[Label] = ()
+        self.shade: Color = (0.0, 0.0, 0.0)
+
+    def show(self, words: Sequence[Label], ratio: float) -> None:
+        """Draw these and no others."""
+        from vtkmodules.vtkRenderingCore import vtkTextActor
+
+        self._words = words
+        while len(self._actors) < len(words):
+            self._actors.append(vtkTextActor())
+            self._renderer.AddViewProp(self._actors[-1])
+        for place, actor in enumerate(self._actors):
+            actor.SetVisibility(place < len(words))
+            if place < len(words):
+                actor.SetInput(words[place].text)
+                look = actor.GetTextProperty()
+                look.SetFontFamilyToArial()
+                look.SetFontSize(round(13 * ratio))
+                look.SetColor(*words[place].color)
+                look.SetBackgroundColor(*self.shade)
+                look.SetBackgroundOpacity(0.62)
+                look.SetVerticalJustificationToCentered()
+
+    def place(self, eye: Eye) -> None:
+        """Put them where their points are now."""
+        if not self._words:
+            return
+        height = eye.viewport[1]
+        for actor, (x, y, depth) in zip(
+            self._actors, eye.project([word.position for word in self._words]), strict=False
+        ):
+            actor.SetVisibility(bool(depth > 0))
+            actor.SetPosition(float(x) + 9 * eye.pixel_ratio, height - float(y))
+
+
+class CornerTexts:
+    """Text at the top left, the bottom left and over the middle."""
+
+    def __init__(self, renderer: Any) -> None:
+        from vtkmodules.vtkRenderingCore import vtkTextActor
+
+        self._actors = [vtkTextActor() for _ in range(3)]
+        for actor in self._actors:
+            actor.SetVisibility(False)
+            renderer.AddViewProp(actor)
+        self._actors[2].GetTextProperty().SetFontFamilyToCourier()
+
+    def set_theme(self, theme: Theme) -> None:
+        """Colours of letters and of what is behind them."""
+        for actor, opacity in zip(self._actors, (0.5, 0.7, 0.92), strict=True):
+            look = actor.GetTextProperty()
+            look.SetColor(*theme.ink)
+            look.SetBackgroundColor(*theme.bottom)
+            look.SetBackgroundOpacity(opacity)
+
+    def write(self, top: str, bottom: str, middle: str, eye: Eye) -> None:
+        """Put texts up; an empty one takes its own away."""
+        width, height = eye.viewport
+        margin = 12 * eye.pixel_ratio
+        places = ((margin, height - margin), (margin, margin), (width / 2, height / 2))
+        for actor, text, (x, y), size in zip(
+            self._actors, (top, bottom, middle), places, (14, 14, 13), strict=True
+        ):
+            actor.SetVisibility(bool(text))
+            actor.SetInput(text)
+            actor.SetPosition(x, y)
+            look = actor.GetTextProperty()
+            look.SetFontSize(round(size * eye.pixel_ratio))
+            look.SetVerticalJustification(2 if actor is self._actors[0] else 1 if actor is self._actors[2] else 0)
+            look.SetJustification(1 if actor is self._actors[2] else 0)
+
+
+def _unlit(renderer: Any, units: float = 0.0) -> tuple[Polygons, Any]:
+    """An actor that shows colours as they are, with what it draws. units: how much it wins over a surface."""
+    from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+    polygons, mapper, actor = Polygons(), vtkPolyDataMapper(), vtkActor()
+    mapper.SetInputData(polygons.data)
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2.5, units)
+    mapper.SetRelativeCoincidentTopologyPointOffsetParameter(units)
+    actor.SetMapper(mapper)
+    look = actor.GetProperty()
+    look.LightingOff()
+    if hasattr(look, "SetPoint2DShapeToRound"):  # VTK 9.4; before that dots are squares
+        look.SetPoint2DShapeToRound()
+    renderer.AddActor(actor)
+    return polygons, actor
+
+
+def _light(renderer: Any) -> None:
+    """A key light from the upper left, a weaker one from the right, and a little from the eye: all go with it."""
+    from vtkmodules.vtkRenderingCore import vtkLight
+
+    for direction, strength in _LIGHTS:
+        light = vtkLight()
+        light.SetLightTypeToCameraLight()
+        light.SetPosition(*direction)
+        light.SetFocalPoint(0, 0, 0)
+        light.SetIntensity(strength)
+        renderer.AddLight(light)
+
+
+def _matrix(values: FloatArray) -> Any:
+    from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
+    matrix = vtkMatrix4x4()
+    matrix.DeepCopy(np.asarray(values, float).ravel().tolist())
+    return matrix
+
+
+def _normals(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """(n, 3) of points by the areas of their triangles."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)  # (t, 3)
+    normals = np.stack(
+        [sum(np.bincount(triangles[:, k], cross[:, axis], len(points)) for k in range(3)) for axis in range(3)], 1
+    )
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+
+
+def _rim(triangles: IntArray) -> IntArray:
+    """(e, 2) the edges that one triangle alone has."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(edges[first[count == 1]])
+
+
+def _pair(pair: PairLine) -> list[Line]:
+    """Which patch meets which: a line between the two, and of a selected pair thin ones between points that are to
+    touch."""
+    if not pair.selected:
+        return [Line(pair.middle, pair.color, 1.5, 0.6)]
+    threads = [Line(np.stack(ends), pair.color, 1.0, 0.55) for ends in zip(pair.starts, pair.ends, strict=True)]
+    return [Line(pair.middle, pair.color, 2.5, 0.95), *threads]
+
+
+def _ring(ring: BrushRing) -> Line:
+    """The brush as a circle round what it points at."""
+    helper = np.eye(3)[int(np.abs(ring.normal).argmin())]
+    first = np.cross(ring.normal, helper)
+    first = first / max(float(np.linalg.norm(first)), 1e-12)
+    around = ring.radius * (_RING @ np.stack([first, np.cross(ring.normal, first)]))  # (49, 3)
+    return Line(ring.centre + around, ring.color, 2.0)

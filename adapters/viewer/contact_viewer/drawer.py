@@ -1,0 +1,87 @@
+"""From the interaction to the canvas: only what changed is sent."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact_core.arrays import FloatArray
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.interaction.interaction import Interaction
+from contact_core.interaction.overlay import Overlay
+from contact_viewer.canvas import GHOST, Canvas
+
+
+class Drawer:
+    """Keeps a canvas as an interaction says.
+
+    hidden_surfaces, hidden_patches: names that the artist has hidden; `stale` after they were changed.
+    """
+
+    def __init__(self, interaction: Interaction, canvas: Canvas) -> None:
+        self._interaction, self._canvas = interaction, canvas
+        self.hidden_surfaces: set[str] = set()
+        self.hidden_patches: set[str] = set()
+        self._drawn: dict[str, TriangleMesh] = {}
+        self.stale = True
+
+    def follow(self) -> frozenset[str]:
+        """Send what changed; the names of the parts that did, "surfaces" among them."""
+        changes = self._interaction.changes()
+        if not changes and not self.stale:
+            return frozenset()
+        parts: set[str] = set(changes.parts)
+        if changes.surfaces or self.stale:
+            parts.add("surfaces")
+            self._shapes()
+        if self.stale or changes.surfaces or "visibility" in parts or "document" in parts:
+            self._looks()
+        if self.stale or "overlay" in parts or "document" in parts or changes.surfaces:
+            self._canvas.show(self._visible(self._interaction.overlay()))
+        self.stale = False
+        return frozenset(parts)
+
+    def points(self, patches: tuple[str, ...] = ()) -> FloatArray:
+        """(k, 3) world: of patches, or of all surfaces that are shown."""
+        overlay = self._interaction.overlay()
+        found = [decal.points for decal in overlay.decals if decal.patch in patches]
+        if not found:
+            scene = self._interaction.desk.scene
+            found = [seen.points for name, seen in scene.surfaces.items() if name not in self.hidden_surfaces]
+        return np.concatenate(found) if found else np.zeros((0, 3))
+
+    def _shapes(self) -> None:
+        scene = self._interaction.desk.scene
+        self._canvas.keep_surfaces(scene.surfaces)
+        for name, seen in scene.surfaces.items():
+            actor = self._canvas.surface(name)
+            if self._drawn.get(name) is not seen.mesh:
+                actor.set_shape(seen.mesh.points, seen.mesh.faces, seen.mesh.vertex_normals)
+                self._drawn[name] = seen.mesh
+            actor.set_place(seen.world)
+
+    def _looks(self) -> None:
+        theme, document = self._canvas.theme, self._interaction.desk.document
+        things = 0
+        for name in self._interaction.desk.scene.surfaces:
+            surface = document.surfaces.get(name)
+            rigged = surface is not None and surface.rig is not None
+            color = theme.skin if rigged else theme.things[things % len(theme.things)]
+            things += not rigged
+            opacity = 0.0 if name in self.hidden_surfaces else self._interaction.opacity(name)
+            if 0.0 < opacity < 1.0:
+                opacity = GHOST
+            self._canvas.surface(name).set_look(color, opacity=opacity, visible=opacity > 0.0)
+
+    def _visible(self, overlay: Overlay) -> Overlay:
+        """The overlay without what is hidden."""
+        hidden = self.hidden_patches
+        away = self.hidden_surfaces | {
+            name for name in self._interaction.desk.scene.surfaces if self._interaction.opacity(name) == 0.0
+        }
+        if not hidden and not away:
+            return overlay
+        return Overlay(
+            tuple(d for d in overlay.decals if d.patch not in hidden and d.surface not in away),
+            tuple(axis for axis in overlay.axes if axis.patch not in hidden),
+            overlay.handles, overlay.pair_lines, overlay.rings, overlay.ghosts, overlay.labels, overlay.tint,
+        )  # fmt: skip

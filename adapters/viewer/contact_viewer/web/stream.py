@@ -1,0 +1,194 @@
+"""The view in the browser: events queue up, and each frame answers all of them with one image.
+
+Between two frames any number of moves may come (a mouse tells 125 a second, software draws 15 to 30 frames): they
+are handled one after the other, which is cheap, then one live solve, one upload and one image follow. While things
+move images are small and quick; what stands still is drawn once more, with smooth edges.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import logging
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from contact_core.interaction.events import Event, Pointer
+from contact_viewer.application import Application
+from contact_viewer.web.browser_events import pointer_of
+
+log = logging.getLogger(__name__)
+_QUICK, _SHARP = 72, 93  # qualities of JPEG
+_REST = 0.18  # seconds without a change, after which a frame stands still
+_POLL = 0.08  # seconds between looks at work that runs beside the window
+_MOST_PIXELS = 2560 * 1600  # of an image: a screen of 4K is drawn a little smaller
+_MOST_WAITING = 400  # events; what comes beyond is dropped, moves first
+
+
+class Stream:
+    """An area of trame-rca (an "area adapter") that shows an application.
+
+    changed: told which parts changed, once a frame. A name that trame-rca knows it by is `area_name`.
+    """
+
+    def __init__(self, app: Application, name: str, changed: Callable[[frozenset[str]], None]) -> None:
+        self.area_name = name
+        self._app, self._changed = app, changed
+        self._streamer: Any = None
+        self._wanted = asyncio.Event()
+        self._events: list[Event] = []
+        self._pressed: set[str] = set()
+        self._scale = 1.0
+        self._sharp = False
+        self._resized = True
+        self._task: asyncio.Task[None] | None = None
+        self.frames = 0
+
+    # -- what trame-rca calls --------------------------------------------------------------------------------
+
+    def set_streamer(self, streamer: Any) -> None:
+        """Who takes images."""
+        self._streamer = streamer
+        self.wake(redraw=True)
+
+    def update_size(self, _: object, size: Mapping[str, Any]) -> None:
+        """The area in the browser has another size."""
+        width, height = max(10, int(size.get("w", 300))), max(10, int(size.get("h", 300)))
+        ratio = min(max(float(size.get("p", 1) or 1), 0.5), 4.0)
+        fitting = min(1.0, (_MOST_PIXELS / (width * height * ratio * ratio)) ** 0.5)
+        self._scale = ratio * fitting
+        self._app.canvas.resize(round(width * self._scale), round(height * self._scale))
+        self._app.canvas.eye.pixel_ratio = self._scale
+        self._app.drawer.stale = True
+        self.wake(redraw=True)
+
+    def on_interaction(self, _: object, event: Mapping[str, Any]) -> None:
+        """Something happened to the pointer."""
+        scaled = {
+            key: value * self._scale if key in ("x", "y") and isinstance(value, (int, float)) else value
+            for key, value in event.items()
+        }
+        pointer = pointer_of(scaled, self._app.canvas.eye.viewport[1], time.monotonic())
+        if pointer is not None and self._is_whole(pointer):
+            self.put(pointer)
+
+    def reset(self) -> None:
+        """A new client: it wants an image."""
+        self.wake(redraw=True)
+
+    def video_codecs(self) -> list[dict[str, Any]]:
+        """None: images are sent."""
+        return []
+
+    def negotiate_video(self, _: object) -> dict[str, str]:
+        """Images are sent."""
+        return {"error": "not-a-video-stream"}
+
+    # -- frames ----------------------------------------------------------------------------------------------
+
+    def put(self, event: Event) -> None:
+        """Queue an event for the next frame."""
+        if len(self._events) >= _MOST_WAITING:
+            self._events = [
+                each for each in self._events if not (isinstance(each, Pointer) and each.kind == "move")
+            ]
+        if len(self._events) < _MOST_WAITING:
+            self._events.append(event)
+        self.wake()
+
+    def wake(self, *, redraw: bool = False) -> None:
+        """Look whether there is something to draw. redraw: in any case."""
+        self._resized |= redraw
+        self._wanted.set()
+
+    def start(self) -> None:
+        """Draw from now on, in the running loop."""
+        self._task = asyncio.get_running_loop().create_task(self._run())
+
+    async def close(self) -> None:
+        """Draw no more."""
+        if self._task is not None:
+            self._task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._task
+
+    async def _run(self) -> None:
+        while True:
+            await self._wait()
+            try:
+                drawn = await self._frame()
+                if not drawn and not self._sharp:
+                    await self._send(still=True)
+                    self._sharp = True
+            except Exception:  # one bad frame must not end the application; the artist's document is whole
+                log.exception("a frame failed")
+                await asyncio.sleep(0.2)
+            await asyncio.sleep(0)  # events come in while nothing is drawn
+
+    async def _wait(self) -> None:
+        """Until something happened; for a while only, where something is due by itself."""
+        working = self._app.interaction.worker.status is not None
+        seconds = _POLL if working else None if self._sharp else _REST
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._wanted.wait(), seconds)
+        self._wanted.clear()
+
+    async def _frame(self) -> bool:
+        """Handle what came, and draw if anything changed; whether it did."""
+        events, self._events = self._events, []
+        for event in events:
+            self._app.handle(event)
+        parts = self._app.frame()
+        if parts:
+            self._changed(parts)
+        redraw, self._resized = self._resized, False
+        if not (parts - {"work", "status"}) and not redraw:
+            return bool(events)
+        self._sharp = False
+        await self._send(still=False)
+        return True
+
+    async def _send(self, *, still: bool) -> None:
+        if self._streamer is None:
+            return
+        pixels = self._app.canvas.rgba(still=still)
+        quality = _SHARP if still else _QUICK
+        loop = asyncio.get_running_loop()
+        content = await loop.run_in_executor(None, encoded, pixels, quality)
+        height, width = pixels.shape[:2]
+        self.frames += 1
+        meta = {"type": "image/jpeg", "codec": "", "w": width, "h": height, "st": int(time.time() * 1000),
+                "key": "key", "quality": quality}  # fmt: skip
+        self._streamer.push_content(self.area_name, meta, content)
+        await self._drained()
+
+    async def _drained(self) -> None:
+        """Wait, not long, for the browser to take what was sent: else images pile up and all of them are late."""
+        monitor = self._streamer.coreServer.network_monitor
+        for _ in range(50):
+            if monitor.pending <= 1:
+                return
+            await asyncio.sleep(0.004)
+
+    def _is_whole(self, event: Pointer) -> bool:
+        """Whether a release belongs to a press that was seen here."""
+        if event.kind == "press":
+            self._pressed.add(event.button)
+        elif event.kind == "release":
+            if event.button not in self._pressed:
+                return False
+            self._pressed.discard(event.button)
+        return True
+
+
+def encoded(pixels: Any, quality: int) -> bytes:
+    """JPEG of an image (h, w, 4) whose last channel says nothing."""
+    from PIL import Image
+
+    height, width = pixels.shape[:2]
+    stream = io.BytesIO()
+    image = Image.frombuffer("RGBX", (width, height), pixels, "raw", "RGBX", 0, 1)
+    image.save(stream, "jpeg", quality=quality, subsampling=0 if quality > 90 else 2)
+    return stream.getvalue()

@@ -1,0 +1,115 @@
+"""`contact view --window`: the same application in a plain window of VTK, with keys and a line of status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from contact_core.errors import FileRefused
+from contact_core.interaction.actions import GROUPS
+from contact_core.plugins.manager import PluginManager
+from contact_viewer import panel
+from contact_viewer.application import Application
+from contact_viewer.canvas import Canvas
+from contact_viewer.gl import has_screen, screen_window
+from contact_viewer.vtk_events import VtkEvents
+
+_SIZE = (1280, 800)
+_TICK = 12  # milliseconds between looks at what is due
+_REST = 15  # ticks without a change, after which a frame stands still
+_COLUMN = 26  # rows of the help
+
+
+class Front:
+    """An application behind a VTK interactor. `tick` draws if anything changed."""
+
+    def __init__(self, app: Application, interactor: Any) -> None:
+        self.app = app
+        self.events = VtkEvents(interactor, app.handle)
+        self._interactor = interactor
+        self._size = app.canvas.eye.viewport
+        self._quiet = 0
+
+    def tick(self) -> bool:
+        """One turn of the loop: handle what is due and draw; whether something was drawn."""
+        app, resized = self.app, self.app.canvas.eye.viewport != self._size
+        self._size = app.canvas.eye.viewport
+        self._ask()
+        parts = app.frame()
+        if parts or resized:
+            self._quiet = 0
+            self._show_texts()
+            app.canvas.render()
+            return True
+        self._quiet += 1
+        if self._quiet == _REST:
+            app.canvas.render(still=True)
+        return self._quiet == _REST
+
+    def run(self) -> None:
+        """Until the window is closed. Raises what an event raised."""
+        self._interactor.Initialize()
+        self._interactor.AddObserver("TimerEvent", self._on_timer)
+        self._interactor.CreateRepeatingTimer(_TICK)
+        self._interactor.Start()
+        self.events.raise_errors()
+
+    def _on_timer(self, *_: object) -> None:
+        try:
+            self.tick()
+        except BaseException as error:
+            self.events.errors.append(error)
+        if self.events.errors:
+            self._interactor.TerminateApp()
+
+    def _ask(self) -> None:
+        """Files: a plain window has no dialogs."""
+        wanted, self.app.wants = self.app.wants, None
+        if wanted == "open":
+            self.app.say(
+                "name files at the start, contact view FILE ..., or leave --window out to choose them here."
+            )
+        elif wanted == "export":
+            self.app.attempt(lambda: self.app.export(self._export_path()))
+
+    def _export_path(self) -> Path:
+        host = self.app.session.host
+        opened = getattr(host, "path", None)
+        return (opened or Path.cwd() / "contacts").with_suffix(".glb")
+
+    def _show_texts(self) -> None:
+        app = self.app
+        head = panel.report(app.meets, app.interaction.desk.document)["head"]
+        undo = app.undo_name()
+        top = [app.title, head if app.meets else panel.next_step(app.session, app.interaction)]
+        top += [f"undo: {undo}"] if undo else []
+        line = " · ".join(part for part in (app.line(), app.refusal()) if part)
+        app.canvas.write(" · ".join(top), line, help_text(app) if app.help_wanted else "")
+
+
+def help_text(app: Application) -> str:
+    """The table of keys in columns."""
+    table = sorted((each for each in app.table() if each.keys), key=lambda each: GROUPS.index(each.group))
+    rows = [f"{', '.join(each.keys):<20.20} {each.label:<20.20}" for each in table]
+    columns = [rows[k : k + _COLUMN] for k in range(0, len(rows), _COLUMN)]
+    return "\n".join(
+        "  ".join(column[k] if k < len(column) else " " * 41 for column in columns).rstrip()
+        for k in range(len(columns[0]) if columns else 0)
+    )
+
+
+def run_window(sources: Sequence[str], plugins: PluginManager) -> None:
+    """Open a window on files, until it is closed. Raises FileRefused, also where there is no screen."""
+    if not has_screen():
+        raise FileRefused("there is no screen here (DISPLAY is not set): leave --window out, and open the address.")
+    from vtkmodules.vtkRenderingCore import vtkRenderWindowInteractor
+
+    window = screen_window(_SIZE, "contact")
+    interactor = vtkRenderWindowInteractor()
+    interactor.SetRenderWindow(window)
+    app = Application(Canvas(window), sources, plugins)
+    try:
+        Front(app, interactor).run()
+    finally:
+        app.close()
