@@ -1,4 +1,4 @@
-"""Errors that are sentences: what was wanted, what came, what to do.
+"""Errors that are sentences: what was expected, what was given, what to do.
 
 One small family. Code that talks to people (the command line, an adapter's panel) catches
 `ContactError` and shows its text; everything else is a bug and keeps its traceback.

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.document.document import ContactDocument
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.edit.announcer import Announcer, DocumentChanged, Listener
 from contact_core.edit.command import Command
 from contact_core.edit.command_table import BUILT_IN_COMMANDS
 from contact_core.edit.commands import SetExtra
 from contact_core.edit.derived import Derived
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.edit.history import History, Step
+from contact_core.edit.listeners import DocumentChanged, Listener, Listeners
 from contact_core.edit.open_document import OpenDocument, real_path
+from contact_core.edit.open_edits import OpenEdits
 from contact_core.edit.open_macro import OpenMacro
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
-from contact_core.edit.under_way import UnderWay
 from contact_core.edit.verbs import ContactSets, Film, Pairs, Patches
 from contact_core.errors import CommandRejected, FileRefused
 from contact_core.plugins.makers import PluginMakers
@@ -77,11 +77,11 @@ class Session(ProposingSession):
         self.history = History(document or ContactDocument())
         self.rigs = {}
         self._derived = Derived()
-        self._announcer = Announcer()
-        self._announcer.listen(self._tell_plugins)
+        self._listeners = Listeners()
+        self._listeners.listen(self._tell_plugins)
         self._file: OpenDocument | None = None
         self._opening_notes: tuple[str, ...] = ()
-        self._under_way = UnderWay()
+        self._open_edits = OpenEdits()
         self._plugins: PluginManager | None = None if isinstance(plugins, Iterable) else plugins
         self._plugin_arguments = (tuple(plugins) if isinstance(plugins, Iterable) else (), discover)
         self.makers = PluginMakers(lambda: self.plugins)
@@ -194,14 +194,14 @@ class Session(ProposingSession):
         one of the host's suffixes, and None is returned. Raises FileRefused; what is on the disk is then untouched.
         """
         if self._file is None and self._host_link is not None and self._host_link.saves(path):
-            with self._under_way.alone():
+            with self._open_edits.alone():
                 self._host_link.save(path)
                 self.history.mark_clean()
             return None
         target = real_path(Path(path)) if path is not None else self.path
         if target is None:
             raise FileRefused("this document has no file yet: save it with a path.")
-        with self._under_way.alone():
+        with self._open_edits.alone():
             if self._file is not None and target == self.path and not self.read_only:
                 self._file.save(self.history)
             else:
@@ -243,7 +243,7 @@ class Session(ProposingSession):
     @property
     def timed_document(self) -> ContactDocument:
         """The document with its tracks and spans; `document` is what it comes to at the frame that is shown."""
-        return self._under_way.document or self.history.document
+        return self._open_edits.document or self.history.document
 
     @property
     def derived(self) -> Derived:
@@ -289,11 +289,11 @@ class Session(ProposingSession):
         the same undo step. Raises CommandRejected, or FileRefused when it cannot be recorded; then nothing has
         changed.
         """
-        with self._under_way.alone():
+        with self._open_edits.alone():
             self._check_writable()
             command = self.timeline.keyed(command)
-            if self._under_way.macro is not None:
-                self._under_way.macro.do(command)
+            if self._open_edits.macro is not None:
+                self._open_edits.macro.do(command)
                 return
             self._commit(command, origin, merge, keys)
 
@@ -305,7 +305,7 @@ class Session(ProposingSession):
         keys: Mapping[float, Mapping[str, Pose]] | None = None,
     ) -> None:
         """Do what `do` says of a command that keys what has tracks."""
-        with self._under_way.alone():
+        with self._open_edits.alone():
             host_keeps_steps = self._host_link is not None and self._host_link.has_undo
             if self._host_link is not None:
                 self._host_link.check_unchanged()
@@ -344,9 +344,9 @@ class Session(ProposingSession):
         self._go("goto", revision, origin)
 
     def _go(self, kind: Literal["undo", "redo", "goto"], revision: int = 0, origin: str = "user") -> None:
-        with self._under_way.alone():
+        with self._open_edits.alone():
             if origin == "host":
-                self._under_way.abandon()
+                self._open_edits.abandon()
             else:
                 self._check_idle()
             before, came_from = self.history.document, self.revision
@@ -373,8 +373,8 @@ class Session(ProposingSession):
 
     def adopt(self, history: History) -> None:
         """Go on with another history: the host brought a document that this one does not know."""
-        with self._under_way.alone():
-            self._under_way.abandon()
+        with self._open_edits.alone():
+            self._open_edits.abandon()
             before, self.history = self.history.document, self._bound(history)
             if self._file is not None:
                 with _warned():
@@ -385,17 +385,17 @@ class Session(ProposingSession):
     def macro(self, title: str) -> Iterator[Session]:
         """Everything done inside is one undo step; an exception takes all of it back. A macro within a macro is
         part of it, and an exception takes that part back."""
-        with self._under_way.alone():
+        with self._open_edits.alone():
             self._check_writable()
-            if self._under_way.macro is not None:
-                with self._under_way.macro.part():
+            if self._open_edits.macro is not None:
+                with self._open_edits.macro.part():
                     yield self
                 return
-            macro = self._under_way.macro = OpenMacro(title, self.history.document)
+            macro = self._open_edits.macro = OpenMacro(title, self.history.document)
             try:
                 yield self
             finally:
-                self._under_way.macro = None
+                self._open_edits.macro = None
             command = macro.end()
             if command is not None:
                 self._commit(command)
@@ -407,14 +407,14 @@ class Session(ProposingSession):
         What fails, in the drag or in committing it, leaves the document as it was at the start, and listeners see
         that again.
         """
-        with self._under_way.alone():
+        with self._open_edits.alone():
             self._check_writable()
             start = self.document
             stroke = Stroke(self, lambda shown: self._preview(start, shown))
-            self._under_way.stroke = stroke
+            self._open_edits.stroke = stroke
             try:
                 yield stroke
-                command, self._under_way.stroke = stroke.end(), None
+                command, self._open_edits.stroke = stroke.end(), None
                 if command is not None:
                     self.do(command)
             except BaseException:
@@ -423,11 +423,11 @@ class Session(ProposingSession):
                 raise
             finally:
                 stroke.end()
-                self._under_way.stroke = None
+                self._open_edits.stroke = None
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` after every change and preview, in their order; the returned function stops that."""
-        return self._announcer.listen(listener)
+        return self._listeners.listen(listener)
 
     def show_ghost(self, ghost: Proposal | None) -> None:
         """Tell listeners of a preview of what is proposed; None: back to the document."""
@@ -438,11 +438,11 @@ class Session(ProposingSession):
     def _check_writable(self) -> None:
         if self._file is not None and self._file.read_only is not None:
             raise CommandRejected(self._file.read_only)
-        self._under_way.check_no_stroke()
+        self._open_edits.check_no_stroke()
 
     def _check_idle(self) -> None:
         self._check_writable()
-        self._under_way.check_nothing()
+        self._open_edits.check_nothing()
 
     @contextlib.contextmanager
     def _in_host(
@@ -467,7 +467,7 @@ class Session(ProposingSession):
         """Tell listeners that another frame is shown. before: the document at the frame before it."""
         if self.document is not before:
             change = DocumentChanged("frame", before, self.document, self.revision, None, "user")
-            self._announcer.tell(change)
+            self._listeners.tell(change)
 
     def _tell(
         self,
@@ -479,10 +479,10 @@ class Session(ProposingSession):
     ) -> None:
         """Tell listeners what changed, at the frame that is shown."""
         shown = self.timeline.shown(before), self.timeline.shown(after)
-        self._announcer.tell(DocumentChanged(kind, *shown, self.revision, command, origin))
+        self._listeners.tell(DocumentChanged(kind, *shown, self.revision, command, origin))
 
     def _preview(self, start: ContactDocument, shown: ContactDocument) -> None:
-        self._announcer.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))
+        self._listeners.tell(DocumentChanged("preview", start, shown, self.revision, None, "user"))
 
 
 @contextlib.contextmanager

@@ -14,7 +14,7 @@ class History:
         parser.add_argument("file", type=Path, metavar="FILE", help="a document or a journal")
 
     def run(self, arguments: argparse.Namespace) -> int:
-        from contact_core.edit.tell import history_lines
+        from contact_core.edit.summaries import history_lines
         from contact_core.plugins.registry import COMMANDS
 
         lines = history_lines(arguments.file, arguments.plugins.offers(COMMANDS))
@@ -31,7 +31,7 @@ class Replay:
         parser.add_argument("--out", type=Path, metavar="FILE", help="the document to write; without it, only tell")
 
     def run(self, arguments: argparse.Namespace) -> int:
-        from contact_core.edit.tell import replay_lines
+        from contact_core.edit.summaries import replay_lines
         from contact_core.plugins.registry import COMMANDS
 
         lines = replay_lines(arguments.journal, arguments.out, arguments.plugins.offers(COMMANDS))
@@ -49,7 +49,7 @@ class Diff:
         parser.add_argument("after", type=Path, metavar="B")
 
     def run(self, arguments: argparse.Namespace) -> int:
-        from contact_core.edit.tell import diff_lines
+        from contact_core.edit.summaries import diff_lines
 
         lines = diff_lines(arguments.before, arguments.after)
         arguments.output.answer({"changes": lines}, "\n".join(lines) or "nothing changed")

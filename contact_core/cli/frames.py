@@ -23,6 +23,6 @@ def frames_of(text: str) -> tuple[float, ...]:
             raise ValueError
     except (ValueError, OverflowError) as error:
         raise InvalidInput(
-            f"frames are like 1,5,10-20, rising and at most {MOST_FRAMES} in a range, but {text!r} came."
+            f"frames are like 1,5,10-20, rising and at most {MOST_FRAMES} in a range, but got {text!r}."
         ) from error
     return tuple(sorted(frames))

@@ -32,7 +32,7 @@ class NewPlugin:
 def write_plugin(name: str, folder: Path) -> Path:
     """Write the template as folder/name; whole or not at all. Raises InvalidInput, FileRefused."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*([-_.][A-Za-z0-9]+)*", name):
-        raise InvalidInput(f"a plugin's name is letters and digits joined by hyphens, but {name!r} came.")
+        raise InvalidInput(f"a plugin's name is letters and digits joined by hyphens, but got {name!r}.")
     import_name = re.sub(r"[-.]", "_", name).lower()
     if keyword.iskeyword(import_name) or import_name in ("contact_core", "contact_builtins", "test", "tests"):
         raise InvalidInput(f"{name!r} cannot be the name of a package; choose another, such as studio-{name}.")

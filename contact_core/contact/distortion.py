@@ -51,7 +51,7 @@ def measure_distortion(
     Positions are in the same units. mirrored: an even copy turns each triangle round.
     """
     if positions.shape != positions_there.shape:
-        raise InvalidInput(f"distortion compares as many points: {len(positions)} and {len(positions_there)} came.")
+        raise InvalidInput(f"expected as many points on both, but got {len(positions)} and {len(positions_there)}.")
     n = len(positions)
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ends = np.concatenate([edges[:, 0], edges[:, 1]])

@@ -58,7 +58,7 @@ def met(gesture: BrushGesture, screen: FloatArray) -> Met:
     Raises InvalidInput for a gesture without rays.
     """
     if gesture.rays is None:
-        raise InvalidInput("a stroke on the screen needs the callable that makes rays of positions, but none came.")
+        raise InvalidInput("a stroke on the screen needs the callable that makes rays of positions, but got none.")
     origins, directions = gesture.rays(screen)
     seen = gesture.seen or gesture.mesh
     hits = Locator.of(seen).cast(origins, directions)

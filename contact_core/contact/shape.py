@@ -148,7 +148,7 @@ class PatchShape:
         anchors = self.coordinates.anchors
         if len(anchors) and anchors.max() >= self.axis.point_count:
             raise InvalidInput(
-                f"anchors index the {self.axis.point_count} axis points, but {int(anchors.max())} came among them."
+                f"anchors index the {self.axis.point_count} axis points, but got {int(anchors.max())} among them."
             )
         if not 0.0 < self.meters_per_unit < np.inf:
             raise InvalidInput(f"meters_per_unit is a positive number, but got {self.meters_per_unit}.")

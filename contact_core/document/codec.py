@@ -71,17 +71,17 @@ def freeze_json(data: Any, depth: int = 0) -> Any:
         return data
     if isinstance(data, int):
         if not -(1 << 63) <= data < 1 << 63:
-            raise FileRefused("JSON data holds whole numbers of at most 64 bits, but a larger one came.")
+            raise FileRefused("JSON data holds whole numbers of at most 64 bits, but got a larger one.")
         return data
     if isinstance(data, float):
         return _finite(data, "JSON data")
     if depth >= MAX_DEPTH:
-        raise FileRefused(f"JSON data holds at most {MAX_DEPTH} levels of lists and objects, but more came.")
+        raise FileRefused(f"JSON data holds at most {MAX_DEPTH} levels of lists and objects, but got more.")
     if isinstance(data, Mapping):
         return FrozenMap({_text(key, "a key"): freeze_json(item, depth + 1) for key, item in data.items()})
     if isinstance(data, (list, tuple)):
         return tuple(freeze_json(item, depth + 1) for item in data)
-    raise FileRefused(f"JSON data holds numbers, texts, lists and objects, but {type(data).__name__} came.")
+    raise FileRefused(f"JSON data holds numbers, texts, lists and objects, but got {type(data).__name__}.")
 
 
 class Fragment(str):
@@ -161,7 +161,7 @@ def _decode(annotation: Any, data: Any, where: str) -> Any:
         return _decode_union(annotation, data, where)
     if origin is Literal:
         if data not in get_args(annotation):
-            raise FileRefused(f"{where} is one of {get_args(annotation)}, but {data!r} came.")
+            raise FileRefused(f"{where} is one of {get_args(annotation)}, but got {data!r}.")
         return data
     if origin is FrozenMap:
         (item_type,) = get_args(annotation)
@@ -189,7 +189,7 @@ def _decode_scalar(annotation: Any, data: Any, where: str) -> Any:
         return _finite(float(data), where)
     if annotation is complex and isinstance(data, list) and len(data) == 2:
         return complex(_finite(float(data[0]), where), _finite(float(data[1]), where))
-    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but {str(data)[:60]!r} came.")
+    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but got {str(data)[:60]!r}.")
 
 
 def _decode_union(annotation: Any, data: Any, where: str) -> Any:
@@ -202,25 +202,25 @@ def _decode_union(annotation: Any, data: Any, where: str) -> Any:
             if member.__name__ == kind:
                 return _decode_dataclass(member, data, where)
         names = ", ".join(member.__name__ for member in members)
-        raise FileRefused(f'{where} needs a key "is" that is one of {names}, but {kind!r} came.')
+        raise FileRefused(f'{where} needs a key "is" that is one of {names}, but got {kind!r}.')
     (only,) = [member for member in get_args(annotation) if member is not type(None)]
     return _decode(only, data, where)
 
 
 def _decode_tuple(item_types: tuple[Any, ...], data: Any, where: str) -> tuple[Any, ...]:
     if not isinstance(data, (list, tuple)) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list, but {str(data)[:60]!r} came.")
+        raise FileRefused(f"{where} wants a list, but got {str(data)[:60]!r}.")
     if len(item_types) == 2 and item_types[1] is Ellipsis:
         return tuple(_decode(item_types[0], item, f"{where}[{k}]") for k, item in enumerate(data))
     if len(item_types) != len(data):
-        raise FileRefused(f"{where} wants {len(item_types)} items, but {len(data)} came.")
+        raise FileRefused(f"{where} wants {len(item_types)} items, but got {len(data)}.")
     pairs = zip(item_types, data, strict=True)
     return tuple(_decode(item_type, item, f"{where}[{k}]") for k, (item_type, item) in enumerate(pairs))
 
 
 def _decode_array(annotation: Any, data: Any, where: str) -> np.ndarray[Any, Any]:
     if not isinstance(data, list) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list of numbers, but {str(data)[:60]!r} came.")
+        raise FileRefused(f"{where} wants a list of numbers, but got {str(data)[:60]!r}.")
     dtype = np.dtype(get_args(get_args(annotation)[1])[0])
     complex_wanted = dtype.kind == "c"
     raw = np.array(data, dtype=np.float64 if complex_wanted else None)
@@ -259,17 +259,17 @@ def _decode_dataclass(cls: type, data: Any, where: str) -> Any:
 
 def _object(data: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
-        raise FileRefused(f"{where} wants an object, but {str(data)[:60]!r} came.")
+        raise FileRefused(f"{where} wants an object, but got {str(data)[:60]!r}.")
     return typing.cast("Mapping[str, Any]", data)
 
 
 def _text(data: Any, where: str) -> str:
     if not isinstance(data, str):
-        raise FileRefused(f"{where} wants a text, but {str(data)[:60]!r} came.")
+        raise FileRefused(f"{where} wants a text, but got {str(data)[:60]!r}.")
     return data
 
 
 def _finite(number: float, where: str) -> float:
     if not math.isfinite(number):
-        raise FileRefused(f"{where} wants a finite number, but {number} came.")
+        raise FileRefused(f"{where} wants a finite number, but got {number}.")
     return number

@@ -53,7 +53,7 @@ class Surface:
                 f"world_from_surface of {self.name!r} must be rigid: apply scale and shear to the points instead."
             )
         if not 0.0 < self.meters_per_unit < np.inf:
-            raise InvalidInput(f"meters_per_unit is a positive number, but {self.meters_per_unit} came.")
+            raise InvalidInput(f"meters_per_unit is a positive number, but got {self.meters_per_unit}.")
         if min(self.points, self.faces) < 0:
             raise InvalidInput(f"{self.name!r} cannot have {self.points} points and {self.faces} faces.")
 
@@ -83,7 +83,7 @@ class Patch:
         check_name(self.name, "a patch")
         object.__setattr__(self, "color", _checked_color(self.color))
         if not (0.0 < self.along < np.inf and 0.0 < self.spread < np.inf):
-            raise InvalidInput(f"along and spread are positive factors, but {self.along} and {self.spread} came.")
+            raise InvalidInput(f"along and spread are positive factors, but got {self.along} and {self.spread}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +102,11 @@ class ContactPair:
     def __post_init__(self) -> None:
         check_name(self.name, "a pair")
         if self.manipulator == self.object:
-            raise InvalidInput(f"a pair joins two patches, but {self.object!r} came twice.")
+            raise InvalidInput(f"a pair joins two patches, but got {self.object!r} twice.")
         if not 0.0 <= self.weight < np.inf:
-            raise InvalidInput(f"the weight of a pair is not negative, but {self.weight} came.")
+            raise InvalidInput(f"the weight of a pair is not negative, but got {self.weight}.")
         if not 0.0 <= self.gain <= 1.0:
-            raise InvalidInput(f"the gain of a pair is 0..1, but {self.gain} came.")
+            raise InvalidInput(f"the gain of a pair is 0..1, but got {self.gain}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,9 +259,9 @@ def _checked_color(color: Any) -> Color:
     try:
         r, g, b = (float(number) for number in color)
     except (TypeError, ValueError):
-        raise InvalidInput(f"a colour is three numbers in 0..1, but {str(color)[:60]!r} came.") from None
+        raise InvalidInput(f"a colour is three numbers in 0..1, but got {str(color)[:60]!r}.") from None
     if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
-        raise InvalidInput(f"a colour is three numbers in 0..1, but {color} came.")
+        raise InvalidInput(f"a colour is three numbers in 0..1, but got {color}.")
     return r, g, b
 
 

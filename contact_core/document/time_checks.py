@@ -14,7 +14,7 @@ from contact_core.motion.placement_keys import PlacementKey
 def time_inconsistencies(document: ContactDocument) -> Iterator[str]:
     """Of the timeline, and of all tracks and spans."""
     yield from (
-        f"there is one timeline, {FILM!r}, but {name!r} came." for name in document.timelines if name != FILM
+        f"there is one timeline, {FILM!r}, but got {name!r}." for name in document.timelines if name != FILM
     )
     for where, track in document.tracks.items():
         yield from track_inconsistencies(document, where, track)

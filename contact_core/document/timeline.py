@@ -39,9 +39,9 @@ class Timeline:
 
     def __post_init__(self) -> None:
         if len(self.rate) != 2 or not all(0 < part <= 1_000_000 for part in self.rate):
-            raise InvalidInput(f"a rate is a fraction of two positive whole numbers, but {self.rate} came.")
+            raise InvalidInput(f"a rate is a fraction of two positive whole numbers, but got {self.rate}.")
         if not -math.inf < self.first <= self.last < math.inf:
-            raise InvalidInput(f"a range runs from a frame to a later one, but {self.first} to {self.last} came.")
+            raise InvalidInput(f"a range runs from a frame to a later one, but got {self.first} to {self.last}.")
 
     @property
     def frames_per_second(self) -> float:
@@ -67,9 +67,9 @@ class Span:
 
     def __post_init__(self) -> None:
         if not -math.inf < self.on <= self.off < math.inf:
-            raise InvalidInput(f"a span runs from a frame to a later one, but {self.on} to {self.off} came.")
+            raise InvalidInput(f"a span runs from a frame to a later one, but got {self.on} to {self.off}.")
         if not (0.0 <= self.ease_in < math.inf and 0.0 <= self.ease_out < math.inf):
-            raise InvalidInput(f"a span eases over 0 frames or more, but {self.ease_in}, {self.ease_out} came.")
+            raise InvalidInput(f"a span eases over 0 frames or more, but got {self.ease_in}, {self.ease_out}.")
 
     def gain(self, frame: float) -> float:
         """0..1 how far the contact is on: a minimum-jerk ramp (Flash and Hogan 1985) on either side."""
@@ -107,7 +107,7 @@ class WeightKey:
     def __post_init__(self) -> None:
         _check_key(self)
         if not 0.0 <= self.weight < math.inf:
-            raise InvalidInput(f"the weight of a pair is not negative, but {self.weight} came.")
+            raise InvalidInput(f"the weight of a pair is not negative, but got {self.weight}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +176,7 @@ def of_address(track: str) -> tuple[str, str]:
     """The kind of a track, and the name of what it is of. Raises InvalidInput for what is no address."""
     kind, slash, name = track.partition("/")
     if kind not in KINDS or not slash:
-        raise InvalidInput(f'a track is one of {", ".join(KINDS)} and a name, as "pose/hand", but {track!r} came.')
+        raise InvalidInput(f'a track is one of {", ".join(KINDS)} and a name, as "pose/hand", but got {track!r}.')
     return kind, name
 
 
@@ -290,6 +290,6 @@ def _speeds(keys: tuple[PoseKey, ...], at: int) -> FloatArray:
 
 def _check_key(key: Any) -> None:
     if not math.isfinite(key.frame):
-        raise InvalidInput(f"a frame is a finite number, but {key.frame} came.")
+        raise InvalidInput(f"a frame is a finite number, but got {key.frame}.")
     if key.interpolation not in INTERPOLATIONS:
         raise InvalidInput(f'keys are joined by "smooth", "linear" or "hold", but got {key.interpolation!r}.')

@@ -27,9 +27,9 @@ def command_from_json(data: Any, commands: CommandTable = BUILT_IN_COMMANDS, dep
     Raises FileRefused for unknown kinds and fields that do not fit.
     """
     if depth > MAX_DEPTH:
-        raise FileRefused(f"groups of commands lie at most {MAX_DEPTH} deep within one another, but more came.")
+        raise FileRefused(f"groups of commands lie at most {MAX_DEPTH} deep within one another, but got more.")
     if not isinstance(data, Mapping):
-        raise FileRefused(f"a command is an object, but {str(data)[:60]!r} came.")
+        raise FileRefused(f"a command is an object, but got {str(data)[:60]!r}.")
     fields = dict(data)
     json_id = fields.pop("command", None)
     if json_id == Macro.json_id:

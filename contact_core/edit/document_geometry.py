@@ -116,11 +116,11 @@ class DocumentGeometry:
         """There are points, and all of them lie on the mesh of a surface. Raises InvalidInput."""
         count = len(self.mesh(surface).faces)
         if not len(points):
-            raise InvalidInput(f"a surface point or several were wanted on {surface!r}, but none came.")
+            raise InvalidInput(f"expected a surface point or several on {surface!r}, but got none.")
         outside = (points.faces < 0) | (points.faces >= count)  # (k,)
         if outside.any():
             bad = int(points.faces[np.argmax(outside)])
-            raise InvalidInput(f"{surface!r} has the faces 0..{count - 1}, but a point in face {bad} came.")
+            raise InvalidInput(f"{surface!r} has the faces 0..{count - 1}, but got a point in face {bad}.")
 
     def axis_request(self, surface: str, patch: str, points: SurfacePoints) -> AxisRequest:
         """What an axis generator gets for a patch: bones of the rig, and the axes drawn on the surface so far."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from contact_core.atomic_file import write_atomic
-from contact_core.edit.announcer import DocumentChanged, Listener
+from contact_core.edit.listeners import DocumentChanged, Listener
 
 BY_HAND = "user"  # the origin of what an artist did; assets that are loaded and hosts have others
 

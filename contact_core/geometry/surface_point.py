@@ -100,7 +100,7 @@ class SurfacePoints:
         outside = (wanted < 0) | (wanted >= len(mesh.points))
         if outside.any():
             bad = int(wanted[np.argmax(outside)])
-            raise InvalidInput(f"vertices must be in 0..{len(mesh.points) - 1}, but {bad} came among them.")
+            raise InvalidInput(f"vertices must be in 0..{len(mesh.points) - 1}, but got {bad} among them.")
         corners = mesh.first_corners[wanted]
         if (corners < 0).any():
             raise InvalidInput(f"vertex {int(wanted[np.argmax(corners < 0)])} belongs to no face.")

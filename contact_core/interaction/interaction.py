@@ -30,7 +30,7 @@ from contact_core.plugins.registry import TOOLS, Slot
 from contact_core.settings import configured
 
 if TYPE_CHECKING:
-    from contact_core.edit.announcer import DocumentChanged
+    from contact_core.edit.listeners import DocumentChanged
     from contact_core.session import Session
 
 Part: TypeAlias = Literal["document", "overlay", "selection", "tool", "settings", "status", "work", "visibility"]

@@ -123,7 +123,7 @@ def _mesh_vertices(asset: Asset, vertices: IntArray) -> IntArray:
     """The mesh's vertices that the file's own vertices became. Raises InvalidInput."""
     count = len(asset.mesh.points) if asset.source_vertices is None else len(asset.source_vertices)
     if (vertices >= count).any():
-        raise InvalidInput(f"{asset.name} has vertices 0..{count - 1}, but {int(vertices.max())} came.")
+        raise InvalidInput(f"{asset.name} has vertices 0..{count - 1}, but got {int(vertices.max())}.")
     mapped = vertices if asset.source_vertices is None else asset.source_vertices[vertices]
     if (mapped < 0).any():
         raise InvalidInput(f"vertex {int(vertices[np.argmax(mapped < 0)])} of {asset.name} belongs to no face.")

@@ -101,7 +101,7 @@ def _object(table: Table) -> ObjectSpec:
     solids = table.texts("solids", ("surface",))
     for kind in solids:
         if kind not in ("surface", "hull"):
-            raise InvalidInput(f"{table.where}.solids holds 'surface' and 'hull', but {kind!r} came.")
+            raise InvalidInput(f"{table.where}.solids holds 'surface' and 'hull', but got {kind!r}.")
     box = table.table("hull_box", None)
     spec = ObjectSpec(
         source=_source(table, done=False),
@@ -202,7 +202,7 @@ def _angles(table: Table, joint: str) -> tuple[float, ...]:
     value = table.raw(joint)
     rows = value if isinstance(value, list) else [value]
     if not 1 <= len(rows) <= 3 or any(type(x) not in (int, float) or not abs(x) <= 360 for x in rows):
-        raise InvalidInput(f"{table.where}.{joint} must be one to three angles in degrees, but {value!r} came.")
+        raise InvalidInput(f"{table.where}.{joint} must be one to three angles in degrees, but got {value!r}.")
     return tuple(float(x) for x in rows)
 
 
@@ -219,7 +219,7 @@ def _solve(table: Table) -> SolveSpec:
     )
     table.done()
     if min(spec.weights) < 0:
-        raise InvalidInput(f"{table.where}.weights are not negative, but {list(spec.weights)} came.")
+        raise InvalidInput(f"{table.where}.weights are not negative, but got {list(spec.weights)}.")
     return spec
 
 
@@ -246,7 +246,7 @@ def _view(table: Table) -> ViewSpec:
     size = table.counts("size", [1600, 640])
     if len(size) != 2 or not all(64 <= n <= 8192 for n in size):
         raise InvalidInput(
-            f"{table.where}.size must be [width, height] of 64 to 8192 pixels, but {list(size)} came."
+            f"{table.where}.size must be [width, height] of 64 to 8192 pixels, but got {list(size)}."
         )
     spec = ViewSpec(
         camera_from=table.vector("camera_from", None, direction=True),

@@ -46,7 +46,7 @@ def coarse_pose(rig: Rig, spec: CoarseSpec) -> Pose:
             wanted = dofs[-1:] if len(degrees) == 1 else dofs
             if len(wanted) != len(degrees):
                 raise InvalidInput(
-                    f"coarse.pose: joint {rig.joints[joint]!r} has {len(dofs)} angles, but {len(degrees)} came."
+                    f"coarse.pose: joint {rig.joints[joint]!r} has {len(dofs)} angles, but got {len(degrees)}."
                 )
             theta[wanted] = np.clip(np.radians(degrees), chart.lower[wanted], chart.upper[wanted])
     return Pose(rig.joints, chart.local(theta))

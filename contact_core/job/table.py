@@ -34,7 +34,7 @@ class Table:
 
     def __init__(self, values: Any, where: str) -> None:
         if not isinstance(values, Mapping):
-            raise InvalidInput(f"{where} must be a table, but {_spell(values)} came.")
+            raise InvalidInput(f"{where} must be a table, but got {_spell(values)}.")
         self.values, self.where = values, where
         self._asked: set[str] = set()
 
@@ -138,7 +138,7 @@ class Table:
         """The tables of a list `[[key]]`, of which there is at least one."""
         value = self.raw(key)
         if not _is_list(value, 1000) or not value:
-            raise InvalidInput(f"{self.where}.{key} must be a list of tables, [[{key}]], but {_spell(value)} came.")
+            raise InvalidInput(f"{self.where}.{key} must be a list of tables, [[{key}]], but got {_spell(value)}.")
         yield from (Table(item, f"{self.where}.{key}[{place}]") for place, item in enumerate(value))
 
     def exactly_one(self, *keys: str) -> str:
@@ -146,14 +146,14 @@ class Table:
         self._asked.update(keys)
         there = [key for key in keys if key in self.values]
         if len(there) != 1:
-            came = f"{' and '.join(map(repr, there))} came" if there else "none came"
-            raise InvalidInput(f"{self.where} needs exactly one of {', '.join(map(repr, keys))}, but {came}.")
+            got = " and ".join(map(repr, there)) or "none"
+            raise InvalidInput(f"{self.where} needs exactly one of {', '.join(map(repr, keys))}, but got {got}.")
         return there[0]
 
     def _checked(self, key: str, default: Any, wanted: str, fits: Any) -> Any:
         value = self.raw(key, default)
         if key in self.values and not fits(value):
-            raise InvalidInput(f"{self.where}.{key} must be {wanted}, but {_spell(value)} came.")
+            raise InvalidInput(f"{self.where}.{key} must be {wanted}, but got {_spell(value)}.")
         return value
 
 

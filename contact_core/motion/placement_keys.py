@@ -83,7 +83,7 @@ class PlacementKey:
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.frame):
-            raise InvalidInput(f"a frame is a finite number, but {self.frame} came.")
+            raise InvalidInput(f"a frame is a finite number, but got {self.frame}.")
         if self.interpolation not in INTERPOLATIONS:
             raise InvalidInput(f'keys are joined by "smooth", "linear" or "hold", but got {self.interpolation!r}.')
 

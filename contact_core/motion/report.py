@@ -71,7 +71,7 @@ def motion_report(
     """The figures of thetas (n, d). solids: as of the penetration term; an empty mapping measures no depth.
     reductions: of the bodies that were reduced. Raises InvalidInput for thetas of another shape."""
     if thetas.shape != motion.pinned.shape:
-        raise InvalidInput(f"thetas of this motion have the shape {motion.pinned.shape}, but {thetas.shape} came.")
+        raise InvalidInput(f"thetas of this motion have the shape {motion.pinned.shape}, but got {thetas.shape}.")
     states = [problem.state(theta) for problem, theta in zip(motion.posed, thetas, strict=True)]
     pads = _pads(motion, states)
     clock, problem = motion.clock, motion.problems[0]

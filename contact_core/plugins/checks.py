@@ -49,7 +49,7 @@ def _nothing(plugin: object) -> str:
                 f"has hooks in the class {name} alone: put the functions, without self, at the top of the module,"
                 f' or let the entry point say "{module}:{name}".'
             )
-    return f"has no hook: a function marked with @hookimpl was wanted; there are: {', '.join(HOOKS)}."
+    return f"has no hook: expected a function marked with @hookimpl; there are: {', '.join(HOOKS)}."
 
 
 def api_refusal(plugin: object) -> str | None:
@@ -61,7 +61,7 @@ def api_refusal(plugin: object) -> str | None:
     for word in str(wanted).split(","):
         match = re.fullmatch(r"\s*(>=|<=|==|>|<)\s*(\d+)(?:\.(\d+))?\s*", word)
         if match is None:
-            return f'sets CONTACT_API = {wanted!r}; a range such as ">=1.0,<2" was wanted.'
+            return f'sets CONTACT_API = {wanted!r}: expected a range such as ">=1.0,<2".'
         bound = (int(match[2]), int(match[3] or 0))
         mine = hookspecs.API_VERSION
         holds = {

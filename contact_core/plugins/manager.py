@@ -190,7 +190,7 @@ class PluginManager:
             known = self._pluggy.register(plugin, name)
         except (ValueError, pluggy.PluginValidationError) as error:
             return " ".join(str(error).split()) + "."
-        return "is not a plugin: a module or object was wanted, but None came." if known is None else None
+        return "is not a plugin: expected a module or object, but got None." if known is None else None
 
     def _remove(self, name: str) -> None:
         if self._records.pop(name, None) is not None:

@@ -104,7 +104,7 @@ def resolve(reference: str) -> Any:
     """The object behind "package.module:Name". Raises InvalidInput for another spelling; import errors pass."""
     module, colon, name = reference.partition(":")
     if not colon or not module or not name:
-        raise InvalidInput(f'a reference is spelt "package.module:Name", but {reference!r} came.')
+        raise InvalidInput(f'a reference is spelt "package.module:Name", but got {reference!r}.')
     found = import_module(module)
     if not hasattr(found, name):
         near = difflib.get_close_matches(name, dir(found), n=3)
@@ -122,7 +122,7 @@ def shortcomings(candidate: object, slot: Slot[Any]) -> list[str]:
         elif callable(member):
             result += _call_shortcomings(name, member, getattr(candidate, name), bound=slot.instances)
     if not slot.instances and not isinstance(candidate, type):
-        result.append("is an object where a class is wanted")
+        result.append("is an object where a class is expected")
     result += declaration_mistakes(candidate)
     result += [
         f"is default_for {role!r}; a {slot.noun} may be that for: {', '.join(slot.roles) or 'nothing'}"

@@ -49,7 +49,7 @@ class SlidingPatch:
 
     def __post_init__(self) -> None:
         if not (self.slack > 0.0 and self.turn >= 0.0):
-            raise InvalidInput(f"the slack of {self.contact!r} is a positive length, but {self.slack} came.")
+            raise InvalidInput(f"the slack of {self.contact!r} is a positive length, but got {self.slack}.")
 
     @property
     def dof_names(self) -> tuple[str, ...]:

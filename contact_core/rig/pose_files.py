@@ -50,7 +50,7 @@ class PoseLibrary:
 
     def _path(self, name: str) -> Path:
         if not re.fullmatch(r"[\w][\w .()+-]{0,99}", name):
-            raise InvalidInput(f"a pose is named by letters, digits, blanks and . ( ) + - _, but {name!r} came.")
+            raise InvalidInput(f"a pose is named by letters, digits, blanks and . ( ) + - _, but got {name!r}.")
         return self.folder / f"{name}.pose.json"
 
 

@@ -61,7 +61,7 @@ class PoseKeys:
         the speeds of the others stay.
         """
         if not math.isfinite(frame):
-            raise InvalidInput(f"a frame is a finite number, but {frame} came.")
+            raise InvalidInput(f"a frame is a finite number, but got {frame}.")
         keys = dict(zip(self.frames, self.poses, strict=True)) | {float(frame): pose}
         frames = tuple(sorted(keys))
         poses = tuple(keys[f] for f in frames)

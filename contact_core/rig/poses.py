@@ -31,8 +31,8 @@ def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:
         dof = chart.dof_names.index(name)
         if not (math.isfinite(value) and chart.lower[dof] <= value <= chart.upper[dof]):
             raise InvalidInput(
-                f"{name} of {rig.name} is limited to {chart.lower[dof]:.4g} .. {chart.upper[dof]:.4g}, but"
-                f" {value:.4g} came."
+                f"{name} of {rig.name} is limited to {chart.lower[dof]:.4g} .. {chart.upper[dof]:.4g}, but got"
+                f" {value:.4g}."
             )
         theta[dof] = value
     return Pose(rig.joints, chart.local(theta, leftover))
@@ -41,7 +41,7 @@ def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:
 def blend(rig: Rig, first: Pose, second: Pose, share: float) -> Pose:
     """The pose between two: rotations along the shortest arc, all else linearly. share: 0 is first, 1 second."""
     if not math.isfinite(share):
-        raise InvalidInput(f"a blend needs a finite share, but {share} came.")
+        raise InvalidInput(f"a blend needs a finite share, but got {share}.")
     one, two = pose_on(rig, first), pose_on(rig, second)
     turn_one, rest_one = _split(one)
     turn_two, rest_two = _split(two)

@@ -45,15 +45,15 @@ class JointFreedom:
 
     def __post_init__(self) -> None:
         if self.kind not in ROTATION_DOFS:
-            raise InvalidInput(f"a joint is one of {sorted(ROTATION_DOFS)}, but {self.kind!r} came.")
+            raise InvalidInput(f"a joint is one of {sorted(ROTATION_DOFS)}, but got {self.kind!r}.")
         if sorted(self.order) != ["X", "Y", "Z"]:
-            raise InvalidInput(f"an Euler order is a permutation of XYZ, but {self.order!r} came.")
+            raise InvalidInput(f"an Euler order is a permutation of XYZ, but got {self.order!r}.")
         r = ROTATION_DOFS[self.kind]
 
         def fill(name: str, value: Any, default: Any, dtype: Any) -> None:
             given = np.full(r, default, dtype) if value is None else np.asarray(value, dtype)
             if given.shape != (r,) or (dtype is float and np.isnan(given).any()):
-                raise InvalidInput(f"{name} of a {self.kind} joint needs {r} numbers, but {given.tolist()} came.")
+                raise InvalidInput(f"{name} of a {self.kind} joint needs {r} numbers, but got {given.tolist()}.")
             given = given.copy()
             given.setflags(write=False)
             object.__setattr__(self, name, given)
@@ -114,11 +114,11 @@ class Rig:
             raise InvalidInput(f"parents must come before children, but joint {self.joints[bad]!r} comes first.")
         if len(self.freedoms) != j:
             raise InvalidInput(
-                f"a rig needs one freedom per joint: {j} joints, but {len(self.freedoms)} freedoms came."
+                f"a rig needs one freedom per joint: {j} joints, but got {len(self.freedoms)} freedoms."
             )
         if n and (self.skin_joints.min() < 0 or self.skin_joints.max() >= j):
             wrong = self.skin_joints[(self.skin_joints < 0) | (self.skin_joints >= j)]
-            raise InvalidInput(f"skin_joints must be in 0..{j - 1}, but {int(wrong[0])} came among them.")
+            raise InvalidInput(f"skin_joints must be in 0..{j - 1}, but got {int(wrong[0])} among them.")
         off = np.abs(self.skin_weights.sum(axis=1) - 1.0) if n else np.zeros(0)
         if (off > 1e-6).any():
             raise InvalidInput(

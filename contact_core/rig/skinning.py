@@ -187,8 +187,8 @@ def check_points(rig: Rig, points: SurfacePoints) -> None:
     """Raises InvalidInput for points on faces that the rig's skin does not have."""
     if len(points) and (points.faces.min() < 0 or points.faces.max() >= len(rig.faces)):
         raise InvalidInput(
-            f"contacts on {rig.name} must lie on its {len(rig.faces)} faces, but face"
-            f" {int(points.faces.max())} came; were they painted on another surface?"
+            f"contacts on {rig.name} must lie on its {len(rig.faces)} faces, but got face"
+            f" {int(points.faces.max())}; were they painted on another surface?"
         )
 
 

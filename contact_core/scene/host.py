@@ -247,7 +247,7 @@ def check_overwrite(stored: StoredDocument | None) -> None:
 def check_frame(frame: float | None) -> None:
     """What everything with a frame asks first. Raises InvalidInput for infinity, and for NaN, no frame to USD."""
     if frame is not None and not math.isfinite(frame):
-        raise InvalidInput(f"a frame is a number, or None for the scene as it stands, but {frame} came.")
+        raise InvalidInput(f"a frame is a number, or None for the scene as it stands, but got {frame}.")
 
 
 def capabilities(host: HostAdapter) -> tuple[str, ...]:

@@ -89,7 +89,7 @@ class PairedPoints:
         weights = frozen(given, np.float64, (k,), f"weights of contact {self.name!r}")
         if (weights < 0).any():
             raise InvalidInput(
-                f"weights of contact {self.name!r} must not be negative, but {weights.min():.3g} came."
+                f"weights of contact {self.name!r} must not be negative, but got {weights.min():.3g}."
             )
         object.__setattr__(self, "weights", weights)
         if not 0.0 <= self.gain < np.inf:

@@ -53,11 +53,11 @@ class PoseProblem:
         if len(set(names)) != len(names) or not names:
             raise InvalidInput(f"a pose problem needs bodies with unique names, but got {names}.")
         if self.form not in ("squares", "paper"):
-            raise InvalidInput(f'form is "squares" or "paper", but {self.form!r} came.')
+            raise InvalidInput(f'form is "squares" or "paper", but got {self.form!r}.')
         if self.limits not in ("rig", "none", "paper"):
-            raise InvalidInput(f'limits are "rig", "none" or "paper", but {self.limits!r} came.')
+            raise InvalidInput(f'limits are "rig", "none" or "paper", but got {self.limits!r}.')
         if isinstance(self.prior, str) and self.prior not in ("rest", "current"):
-            raise InvalidInput(f'the prior is "rest", "current" or poses by body, but {self.prior!r} came.')
+            raise InvalidInput(f'the prior is "rest", "current" or poses by body, but got {self.prior!r}.')
         for given in (self.free, self.held):
             for body in given or {}:
                 self.body_index(body)

@@ -44,7 +44,7 @@ class Stage:
             return given
         known = ("free", "contacts", "prior", "name")
         if not isinstance(given, Mapping) or set(given) - set(known):
-            raise InvalidInput(f"a stage is a table with some of {', '.join(known)}, but {given!r} came.")
+            raise InvalidInput(f"a stage is a table with some of {', '.join(known)}, but got {given!r}.")
         return cls(**given)
 
     def of(self, problem: PoseProblem, theta: FloatArray) -> PoseProblem:

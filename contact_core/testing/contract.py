@@ -115,7 +115,7 @@ def _check_suite(suite: type[Contract]) -> None:
         if not (name.startswith(expected) and _CLAUSE_NAME.fullmatch(name)):
             raise InvalidInput(
                 f"{suite.__name__}: clauses count up in the order of the file; a name starting with"
-                f" {expected} was wanted, but {name} came."
+                f" {expected} was expected, but got {name}."
             )
         if not (test.__doc__ or "").strip():
             raise InvalidInput(f"{suite.__name__}.{name} needs a docstring: its clause in words.")

@@ -193,5 +193,5 @@ FAMILIES: dict[str, Callable[[], TriangleMesh]] = {
 def family(name: str) -> TriangleMesh:
     """The representative of a family by name."""
     if name not in FAMILIES:
-        raise InvalidInput(f"a mesh family is one of {', '.join(FAMILIES)}, but {name!r} came.")
+        raise InvalidInput(f"a mesh family is one of {', '.join(FAMILIES)}, but got {name!r}.")
     return FAMILIES[name]()

@@ -46,7 +46,7 @@ class Sheet:
     def show(self, *pictures: Picture, aspect: float = 1.0) -> None:
         """A row of pictures, side by side, under what is there already. aspect: width over height of each."""
         if not pictures:
-            raise InvalidInput("a row of a sheet has at least one picture, but none came.")
+            raise InvalidInput("a row of a sheet has at least one picture, but got none.")
         self.rows.append(Row(pictures, aspect))
 
     def measure(self, what: str, here: str, paper: str = "") -> None:

@@ -195,5 +195,5 @@ def test_a_lasso_round_a_finger_takes_the_tip() -> None:
 
 def test_a_lasso_of_two_points_is_refused() -> None:
     stroke = gesture("flat")
-    with pytest.raises(InvalidInput, match="three points or more, but 2 came"):
+    with pytest.raises(InvalidInput, match="three points or more, but got 2"):
         LassoBrush().mark(replace(stroke, path=stroke.path[:2]))

@@ -219,7 +219,7 @@ def test_the_example_of_the_docs_loads(repository: Path, tmp_path: Path) -> None
     ("text", "words"),
     [
         ("", "schema = 1"),
-        ("schema = 2", "2 came"),
+        ("schema = 2", "got 2"),
         ("schema = 1\nlimit = 3", "no 'limit'"),
         ('schema = 1\n[[joint]]\nmatch = "nobody"\nlock = true', "matches no joint"),
         ('schema = 1\n[[joint]]\nmatch = "bend"\nparent = "nobody"', "wants the parent"),

@@ -211,7 +211,7 @@ def test_what_cannot_be_seen_is_said() -> None:
     gesture = across(mesh, 0, 0.1)
     with pytest.raises(InvalidInput, match=r"mesh\.with_points"):
         replace(gesture, seen=meshes.icosphere(1))
-    with pytest.raises(InvalidInput, match="but none came"):
+    with pytest.raises(InvalidInput, match="but got none"):
         DiskBrush().mark(replace(gesture, screen=gesture.screen + 1e5))
     with pytest.raises(InvalidInput, match="rays"):
         strokes(replace(gesture, rays=None), 0.1)

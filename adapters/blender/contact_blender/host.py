@@ -77,7 +77,7 @@ class BlenderHost(
     def __init__(self, path: Path | str | None = None) -> None:
         if compat.version() < compat.OLDEST:
             raise InvalidInput(
-                f"Blender 4.2 or newer is wanted, but this is {'.'.join(map(str, compat.version()))}."
+                f"Blender 4.2 or newer is needed, but this is {'.'.join(map(str, compat.version()))}."
             )
         if path is not None:
             _open_file(Path(path))

@@ -225,5 +225,5 @@ def _frames(text: str) -> tuple[float, ...]:
 def _binding(text: str) -> tuple[str, str]:
     name, equals, path = text.partition("=")
     if not (name and equals and path.startswith("/")):
-        raise argparse.ArgumentTypeError(f"wanted is NAME=/prim/path, but {text!r} came")
+        raise argparse.ArgumentTypeError(f"wanted is NAME=/prim/path, but got {text!r}")
     return name, path

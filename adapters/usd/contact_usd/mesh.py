@@ -75,8 +75,8 @@ def array_of(attribute: Usd.Attribute, shape: tuple[int, ...], dtype: type) -> A
     try:
         return np.asarray([] if value is None else value, dtype).reshape(shape)
     except (TypeError, ValueError) as error:
-        came, wanted = type(value).__name__, attribute.GetTypeName()
-        raise InvalidInput(f"{attribute.GetPath()} holds a {came}, which is no {wanted}.") from error
+        got, expected = type(value).__name__, attribute.GetTypeName()
+        raise InvalidInput(f"{attribute.GetPath()} holds a {got}, where a {expected} is expected.") from error
 
 
 def read_arrays(prim: Usd.Prim) -> MeshArrays:
@@ -151,7 +151,7 @@ def selected_points_of(prim: Usd.Prim, subset: str) -> IntArray:
         return np.unique(chosen)
     if kind != UsdGeom.Tokens.face:
         raise InvalidInput(
-            f"{prim.GetPath()}: the GeomSubset {subset!r} selects {kind}s; faces or points were wanted."
+            f"{prim.GetPath()}: the GeomSubset {subset!r} selects {kind}s: expected faces or points."
         )
     sizes = array_of(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr(), (-1,), np.int64)
     indices = array_of(UsdGeom.Mesh(prim).GetFaceVertexIndicesAttr(), (-1,), np.int64)

@@ -25,7 +25,7 @@ def check_placement(document: ContactDocument, patch: Patch, placement: Placemen
     surface = document.surface(patch.surface)
     if not isinstance(placement, Link):
         if placement.face >= surface.faces:
-            raise CommandRejected(f"{surface.name!r} has {surface.faces} faces, but face {placement.face} came.")
+            raise CommandRejected(f"{surface.name!r} has {surface.faces} faces, but got face {placement.face}.")
         return
     parent = document.patch(placement.parent)
     if placement.parent == patch.name or patch.name in document.ancestors(placement.parent):
@@ -42,7 +42,7 @@ def check_placement(document: ContactDocument, patch: Patch, placement: Placemen
         key = document.patch(name).shape if name != patch.name else patch.shape
         count = document.shapes[key].axis.point_count
         if point >= count:
-            raise CommandRejected(f"the axis of {name!r} has {count} points, but point {point} came.")
+            raise CommandRejected(f"the axis of {name!r} has {count} points, but got point {point}.")
 
 
 def check_links(document: ContactDocument) -> None:

@@ -79,7 +79,7 @@ class Erase(BaseCommand):
         shape = document.shape_of(self.patch)
         if len(self.points) and not 0 <= self.points.min() <= self.points.max() < len(shape):
             raise CommandRejected(
-                f"{self.patch!r} has the points 0..{len(shape) - 1}, but {int(self.points.max())} came among them."
+                f"{self.patch!r} has the points 0..{len(shape) - 1}, but got {int(self.points.max())} among them."
             )
         keep = np.ones(len(shape), dtype=bool)  # (n,)
         keep[self.points] = False

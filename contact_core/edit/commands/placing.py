@@ -79,7 +79,7 @@ class Bend(BaseCommand):
         shape = document.shapes[patch.shape]
         shape.axis.check_bend(self.point)
         if not math.isfinite(self.angle):
-            raise CommandRejected(f"a turning angle is a finite number, but {self.angle} came.")
+            raise CommandRejected(f"a turning angle is a finite number, but got {self.angle}.")
         if patch.original:
             own = dict(patch.turns).get(self.point, 0.0)
             return document.with_shape(patch.shape, shape.with_axis(shape.axis.bent(self.point, self.angle - own)))
@@ -108,9 +108,7 @@ class Scale(BaseCommand):
         patch = document.patch(self.patch)
         shape = document.shapes[patch.shape]
         if not (0.0 < self.along < math.inf and 0.0 < self.spread < math.inf):
-            raise CommandRejected(
-                f"along and spread are positive factors, but {self.along} and {self.spread} came."
-            )
+            raise CommandRejected(f"along and spread are positive factors, but got {self.along} and {self.spread}.")
         if patch.original:
             axis = replace(shape.axis, along=self.along / patch.along, spread=self.spread / patch.spread)
             return document.with_shape(patch.shape, shape.with_axis(axis))

@@ -53,7 +53,7 @@ class BrushVerbs(PaintingVerbs):
         if at is not None:
             gestures += (self._gesture(where, at, radius, spacing),)
         if not gestures:
-            raise InvalidInput(f"the brush {tool.name!r} needs a gesture or several, but none came.")
+            raise InvalidInput(f"the brush {tool.name!r} needs a gesture or several, but got none.")
         mesh = self._geometry.mesh(where)
         if any(gesture.mesh.digest != mesh.digest for gesture in gestures):
             raise InvalidInput(f"a gesture for {patch!r} was made over another mesh than that of {where!r}.")

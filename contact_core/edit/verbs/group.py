@@ -51,19 +51,19 @@ class VerbGroup:
         """A patch has this axis point. Raises InvalidInput."""
         count = self._document.shape_of(patch).axis.point_count
         if not 0 <= point < count:
-            raise InvalidInput(f"the axis of {patch!r} has the points 0..{count - 1}, but {point} came.")
+            raise InvalidInput(f"the axis of {patch!r} has the points 0..{count - 1}, but got {point}.")
 
     def _point_indices(self, patch: str, indices: Any) -> IntArray:
         """(k,) rising, each once, of points that the patch has, k >= 1. Raises InvalidInput for any other."""
         count = len(self._document.shape_of(patch))
         if np.asarray(indices).dtype == bool:
-            raise InvalidInput("point indices are whole numbers, but a mask came: pass numpy.flatnonzero(mask).")
+            raise InvalidInput("point indices are whole numbers, but got a mask: pass numpy.flatnonzero(mask).")
         chosen = np.unique(frozen(indices, np.int64, (None,), "point indices"))
         if not len(chosen):
-            raise InvalidInput(f"indices of points of {patch!r} were wanted, but none came.")
+            raise InvalidInput(f"expected indices of points of {patch!r}, but got none.")
         if not 0 <= chosen[0] <= chosen[-1] < count:
             bad = int(chosen[0] if chosen[0] < 0 else chosen[-1])
-            raise InvalidInput(f"{patch!r} has the points 0..{count - 1}, but {bad} came.")
+            raise InvalidInput(f"{patch!r} has the points 0..{count - 1}, but got {bad}.")
         return chosen
 
     def _relinked(self, child: str, link: Link, point: SurfacePoints, tangent: complex) -> Link:

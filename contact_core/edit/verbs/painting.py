@@ -158,7 +158,7 @@ class PaintingVerbs(VerbGroup):
         shape = self._document.shapes[source.shape]
         taken = self._point_indices(patch, indices)
         if len(taken) == len(shape):
-            raise CommandRejected(f"splitting takes some points of {patch!r}, but all came: rename it instead.")
+            raise CommandRejected(f"splitting takes some points of {patch!r}, but got all: rename it instead.")
         chosen = np.zeros(len(shape), dtype=bool)
         chosen[taken] = True
         color = PALETTE[len(self._document.patches) % len(PALETTE)]

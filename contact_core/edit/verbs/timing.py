@@ -127,7 +127,7 @@ class Film:
     def go(self, frame: float) -> None:
         """Show another frame. No edit: nothing is committed, and nothing is lost."""
         if not np.isfinite(frame):
-            raise InvalidInput(f"a frame is a finite number, but {frame} came.")
+            raise InvalidInput(f"a frame is a finite number, but got {frame}.")
         before = self.shown(self.document)
         self._frame = float(frame)
         self._editor.frame_changed(before)
@@ -397,7 +397,7 @@ def _fraction(rate: float | Fraction | tuple[int, int]) -> tuple[int, int]:
         return rate
     if not isinstance(rate, Fraction):
         if not (np.isfinite(rate) and rate > 0.0):
-            raise InvalidInput(f"a rate is a positive number of frames per second, but {rate} came.")
+            raise InvalidInput(f"a rate is a positive number of frames per second, but got {rate}.")
         video = Fraction(round(rate * 1001 / 1000) * 1000, 1001)
         rate = video if 0.0 < abs(float(video) - rate) < 2e-3 or float(video) == rate else Fraction(rate)
         rate = rate.limit_denominator(1001)

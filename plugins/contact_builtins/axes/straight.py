@@ -29,7 +29,7 @@ def require(request: AxisRequest, count: int = 2) -> FloatArray:
     apart = len(np.unique(np.round(positions / max(request.mesh.bounding_box_diagonal, 1e-300), 9), axis=0))
     if apart < count:
         raise InvalidInput(
-            f"an axis needs a patch of at least {count} points in different places, but {apart} came."
+            f"an axis needs a patch of at least {count} points in different places, but got {apart}."
         )
     return positions
 

@@ -52,7 +52,7 @@ def _drawing(gesture: BrushGesture) -> tuple[FloatArray, Meet]:
         controls = frozen(gesture.screen, np.float64, (None, 2), "control points")
         return controls, lambda places: met(gesture, places)
     if not len(gesture.path):
-        raise InvalidInput("a curve needs control points on the screen or on the surface, but none came.")
+        raise InvalidInput("a curve needs control points on the screen or on the surface, but got none.")
     return gesture.path.positions(gesture.mesh), lambda places: _dropped(gesture, places)
 
 

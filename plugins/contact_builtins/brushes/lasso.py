@@ -33,7 +33,7 @@ class LassoBrush(HasSettings):
         at = _corners(gesture)
         length = float(np.linalg.norm(np.roll(at, -1, axis=0) - at, axis=1).sum()) if len(at) else 0.0
         if len(at) < 3 or length <= 1e-9 * mesh.bounding_box_diagonal:
-            raise InvalidInput(f"a lasso needs a closed curve of three points or more, but {len(at)} came.")
+            raise InvalidInput(f"a lasso needs a closed curve of three points or more, but got {len(at)}.")
         spacing = spacing_of(gesture, 0.15 * length)
         reach = self.reach or 0.5 * length  # more than a flat inside can have
         curve = stroke_line(gesture, max(spacing, length / 200.0), closed=True)

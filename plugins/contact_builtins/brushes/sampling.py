@@ -59,7 +59,7 @@ def stroke_line(gesture: BrushGesture, step: float, *, closed: bool = False) -> 
     """
     line = _seen_line(gesture, step, closed) if gesture.is_drawn else _dropped_line(gesture, step, closed)
     if not len(line):
-        raise InvalidInput("a stroke needs at least one point on the surface, but none came.")
+        raise InvalidInput("a stroke needs at least one point on the surface, but got none.")
     return line[first_of_each(line.positions(gesture.mesh), 1e-9 * gesture.mesh.bounding_box_diagonal)]
 
 

@@ -71,7 +71,7 @@ class VectorHeatEngine:
         Raises InvalidInput, NotManifold.
         """
         if not len(sources):
-            raise InvalidInput("a log map needs at least one source, but none came.")
+            raise InvalidInput("a log map needs at least one source, but got none.")
         refined = _with_sources(mesh, sources)
         solver = _solver(refined.mesh)
         label = _components(refined.mesh)

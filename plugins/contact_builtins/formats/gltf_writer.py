@@ -86,7 +86,7 @@ def glb_bytes(assets: Sequence[Asset], poses: Mapping[str, Pose]) -> bytes:
 
 def _add_object(scene: _Scene, holder: int, asset: Asset, pose: Pose | None) -> None:
     if pose is not None and len(pose.joints) != 1:
-        raise InvalidInput(f"{asset.name!r} has no rig: its pose is one transform, but {len(pose.joints)} came.")
+        raise InvalidInput(f"{asset.name!r} has no rig: its pose is one transform, but got {len(pose.joints)}.")
     mesh = _add_mesh(scene, asset.name, asset.mesh.points, asset.mesh.faces, asset.mesh.vertex_normals, {})
     world = np.eye(4) if pose is None else pose.local[0]
     outer, inner = node_transforms(world)

@@ -90,7 +90,7 @@ def read_sidecar(path: Path) -> Sidecar:
     except InvalidInput as error:
         raise FileRefused(str(error)) from error
     if table.get("schema") != SCHEMA:
-        raise FileRefused(f"{path} needs the line `schema = {SCHEMA}` first; {table.get('schema')!r} came.")
+        raise FileRefused(f"{path} needs the line `schema = {SCHEMA}` first, but got {table.get('schema')!r}.")
     _known(path, table, TOP_KEYS, "the top level")
     rules = table.get("joint", [])
     if not isinstance(rules, list) or not all(isinstance(rule, dict) for rule in rules):
@@ -108,9 +108,9 @@ def read_sidecar(path: Path) -> Sidecar:
         raise FileRefused(f"{path}: [mirror] maps left joint names to right joint names.")
     scale, up = table.get("meters_per_unit"), table.get("up_axis")
     if scale is not None and not (isinstance(scale, int | float) and 0 < scale < float("inf")):
-        raise FileRefused(f"{path}: meters_per_unit must be a positive number; {scale!r} came.")
+        raise FileRefused(f"{path}: meters_per_unit must be a positive number, but got {scale!r}.")
     if up not in (None, "X", "Y", "Z"):
-        raise FileRefused(f'{path}: up_axis is "X", "Y" or "Z"; {up!r} came.')
+        raise FileRefused(f'{path}: up_axis is "X", "Y" or "Z", but got {up!r}.')
     return Sidecar(
         path, tuple(rules), mirror, bool(table.get("guess", True)), scale, up, _hands(path, table.get("hand", []))
     )
@@ -127,7 +127,7 @@ def _hands(path: Path, tables: Any) -> tuple[HandWords, ...]:
                 f"{path}: each [[hand]] needs `hub`, the joint at which its digits part; `thumb` is a joint."
             )
         if table.get("side", "") not in ("", "left", "right"):
-            raise FileRefused(f'{path}: side is "left" or "right"; {table["side"]!r} came.')
+            raise FileRefused(f'{path}: side is "left" or "right", but got {table["side"]!r}.')
         digits = table.get("digits", {})
         if not isinstance(digits, dict) or not all(isinstance(name, str) for name in digits.values()):
             raise FileRefused(f"{path}: `digits` of a [[hand]] maps roles to joint names.")
@@ -150,7 +150,7 @@ def _changed(freedom: JointFreedom, rule: dict[str, Any]) -> JointFreedom:
     """A freedom after one rule. Raises InvalidInput, TypeError or ValueError."""
     kind = rule.get("kind", "hinge" if "axis" in rule else freedom.kind)
     if kind not in ROTATION_DOFS:
-        raise InvalidInput(f"kind is one of {', '.join(ROTATION_DOFS)}; {kind!r} came")
+        raise InvalidInput(f"kind is one of {', '.join(ROTATION_DOFS)}, but got {kind!r}")
     if kind != freedom.kind:
         freedom = JointFreedom(kind=kind, frame=freedom.frame, translates=freedom.translates)
     if "axis" in rule:
@@ -169,7 +169,7 @@ def _changed(freedom: JointFreedom, rule: dict[str, Any]) -> JointFreedom:
     if "prior" in rule:
         weights = np.broadcast_to(np.asarray(rule["prior"], float), ROTATION_DOFS[freedom.kind])
         if not (np.isfinite(weights).all() and (weights >= 0).all()):
-            raise InvalidInput(f"prior weights are not negative; {rule['prior']!r} came")
+            raise InvalidInput(f"prior weights are not negative, but got {rule['prior']!r}")
         freedom = replace(freedom, prior_weight=np.array(weights))
     return _locked(freedom, rule["lock"]) if "lock" in rule else freedom
 
@@ -183,7 +183,7 @@ def _limited(freedom: JointFreedom, rule: dict[str, Any]) -> JointFreedom:
     for key, pair in given.items():
         low, high = (float(value) for value in pair)
         if not low <= high:
-            raise InvalidInput(f"{key} goes from a smaller to a larger angle; {pair!r} came")
+            raise InvalidInput(f"{key} goes from a smaller to a larger angle, but got {pair!r}")
         if key in ANGLES and freedom.kind == "euler":
             dof = ANGLES.index(key)
         elif key not in ANGLES and freedom.kind == "hinge":
@@ -200,7 +200,7 @@ def _locked(freedom: JointFreedom, lock: Any) -> JointFreedom:
         return replace(freedom, locked=np.full(ROTATION_DOFS[freedom.kind], lock))
     if freedom.kind != "euler" or not set(lock) <= set(ANGLES):
         raise InvalidInput(
-            f"lock is true, false, or a list of {', '.join(ANGLES)} on an Euler joint; {lock!r} came"
+            f"lock is true, false, or a list of {', '.join(ANGLES)} on an Euler joint, but got {lock!r}"
         )
     return replace(freedom, locked=np.array([angle in lock for angle in ANGLES]))
 
@@ -210,7 +210,7 @@ def _direction(value: Any) -> FloatArray:
     vector = np.asarray(AXES[value] if isinstance(value, str) and value in AXES else value, float)
     length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
     if not (np.isfinite(length) and length > 0):
-        raise InvalidInput(f"a direction is one of {', '.join(AXES)} or three numbers; {value!r} came")
+        raise InvalidInput(f"a direction is one of {', '.join(AXES)} or three numbers, but got {value!r}")
     return vector / length
 
 

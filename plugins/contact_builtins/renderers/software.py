@@ -42,7 +42,7 @@ class SoftwareRenderer:
     def render(self, pictures: Sequence[Picture], path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
         """Draw pictures side by side into one PNG. Raises InvalidInput, FileRefused."""
         if not pictures or min(size) < 16 or max(size) > 8192:
-            raise InvalidInput(f"a picture needs content and 16 to 8192 pixels a side, but {size} came.")
+            raise InvalidInput(f"a picture needs content and 16 to 8192 pixels a side, but got {size}.")
         edges = [size[0] * place // len(pictures) for place in range(len(pictures) + 1)]
         widths = [right - left for left, right in itertools.pairwise(edges)]
         panels = [draw(picture, (width, size[1])) for picture, width in zip(pictures, widths, strict=True)]

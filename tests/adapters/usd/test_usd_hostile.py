@@ -39,8 +39,8 @@ MESHES = {  # what is wrong, and a word of the refusal
     "counts that cancel": (TRIANGLE.replace("[3]", "[2147483647, -2147483644]"), "the least is -2147483644"),
     "cancelling counts and a hole": (TRIANGLE.replace("[3]", "[6, -3]") + "int[] holeIndices = [0]\n", "add up"),
     "no points": (TRIANGLE.replace(CORNERS, ""), "without points"),
-    "one number for points": (TRIANGLE.replace(CORNERS, "double points = 3\n"), "no point3f"),
-    "words for points": (TRIANGLE.replace(CORNERS, 'string[] points = ["a"]\n'), "no point3f"),
+    "one number for points": (TRIANGLE.replace(CORNERS, "double points = 3\n"), "where a point3f"),
+    "words for points": (TRIANGLE.replace(CORNERS, 'string[] points = ["a"]\n'), "where a point3f"),
     "an operation that does not exist": (
         TRIANGLE + 'uniform token[] xformOpOrder = ["xformOp:bogus"]\n',
         "USD cannot compute: Invalid xform",
@@ -66,7 +66,7 @@ SKELETONS = {  # what is wrong: of the skeleton, of the skin, and a word of the 
     "too few bind transforms": (JOINTS.replace(f", {UNIT}]", "]"), SKIN, "bindTransforms do not fit"),
     "a flat bind transform": (JOINTS.replace(f", {UNIT}]", f", {FLAT}]"), SKIN, "joint a/b flattens"),
     "a bind transform that is no number": (JOINTS.replace(f"[{UNIT},", f"[{NAN},"), SKIN, "joint a flattens"),
-    "a joint too many": (JOINTS, SKIN.replace("[0, 1, 0]", "[0, 7, 0]"), "7 came among them"),
+    "a joint too many": (JOINTS, SKIN.replace("[0, 1, 0]", "[0, 7, 0]"), "7"),
     "a joint before the first": (JOINTS, SKIN.replace("[0, 1, 0]", "[0, -1, 0]"), "skin_joints must be in 0..1"),
     "weights that are no numbers": (
         JOINTS,

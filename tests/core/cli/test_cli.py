@@ -71,7 +71,7 @@ class Shout:
 
     def run(self, arguments: argparse.Namespace) -> int:
         if not arguments.word:
-            raise InvalidInput("a word was wanted, but none came.")
+            raise InvalidInput("expected a word, but got none.")
         if arguments.word == "stop":
             raise KeyboardInterrupt
         if arguments.word == "disk":
@@ -162,7 +162,7 @@ def test_what_would_steer_a_terminal_is_spelt_out(capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("word", "code", "sentence"),
     [
-        ("", 2, "contact: a word was wanted, but none came.\n"),
+        ("", 2, "contact: expected a word, but got none.\n"),
         ("stop", 130, "contact: interrupted.\n"),
         ("disk", 2, "contact: out.json: No space left on device.\n"),
     ],

@@ -65,7 +65,7 @@ CHANGES: list[tuple[str, Change]] = [
     ("does not fit", lambda d: first(d["shapes"]).update(weights=nested(70))),
     ("wants 3 items", lambda d: first(d["patches"]).update(color=[0.0] * 4)),
     ("is filed under", lambda d: d["patches"].update({"other": first(d["patches"])})),
-    ("came twice", lambda d: d["pairs"].update(
+    ("twice", lambda d: d["pairs"].update(
         x={"name": "x", "manipulator": next(iter(d["patches"])), "object": next(iter(d["patches"]))})),
 ]  # fmt: skip
 
@@ -86,7 +86,7 @@ def test_contradictions_are_named(says: str, change: Change) -> None:
         ('"patches": {', '"patches": {}, "patches": {', "names 'patches' twice"),
         ('"mirrored": ', '"mirrored": true, "mirrored": ', "names 'mirrored' twice"),
         ('"weight": ', '"weight": NaN, "w": ', "not a number that a document may hold"),
-        ('"spread": 1.0', '"spread": 1e999', "wants a finite number, but inf"),
+        ('"spread": 1.0', '"spread": 1e999', "wants a finite number, but got inf"),
         # from Python 3.12 on the JSON reader takes deeper data, and the document's own bound refuses it
         ('"extras": {', '"extras": {"x": ' + 5000 * "[" + 5000 * "]" + ", ", "not valid JSON|at most 100 levels"),
     ],

@@ -234,7 +234,7 @@ REFUSALS: dict[str, tuple[Any, str]] = {
     ),
     "a coarse pose of no joint": (lambda r: replace(r, coarse=replace(r.coarse, pose={"toe": (3.0,)})), "toe"),
     "too many angles": (
-        lambda r: replace(r, coarse=replace(r.coarse, pose={"thumb_tip": (3.0, 2.0)})), "has 0 angles, but 2 came"
+        lambda r: replace(r, coarse=replace(r.coarse, pose={"thumb_tip": (3.0, 2.0)})), "has 0 angles, but got 2"
     ),
     "an object of another unit": (
         lambda r: replace(r, object=replace(r.object, scale=1e-9)), "across; mend object.scale, or the units"

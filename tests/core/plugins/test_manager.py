@@ -124,7 +124,7 @@ BROKEN = {
         OFFER + "class Out(BaseException): pass\n@hookimpl\ndef contact_placers(): raise Out('now')\n",
         "its hook contact_placers raised Out: now",
     ),
-    "no_hook": ("answer = 42\n", "has no hook: a function marked with @hookimpl was wanted"),
+    "no_hook": ("answer = 42\n", "has no hook: expected a function marked with @hookimpl"),
     "in_a_class": (
         OFFER + "class Plugin:\n    @hookimpl\n    def contact_placers(self): return [Mine]\n",
         'let the entry point say "in_a_class:Plugin"',
@@ -164,7 +164,7 @@ BROKEN = {
     "host_object": (
         OFFER + "class Host:\n    name = 'h'\n    def space(self): ...\n"
         "@hookimpl\ndef contact_hosts(): return [Host()]\n",
-        "is an object where a class is wanted",
+        "is an object where a class is expected",
     ),
 }
 
@@ -456,7 +456,7 @@ def test_a_term_is_made_anew_for_every_problem() -> None:
     assert (one.weight, two.weight) == (1.0, 2.0) and manager.get(POSE_TERMS, "penetration") is PenetrationTerm
     with pytest.raises(InvalidInput, match="'penetration': weight is at least 0"):
         manager.make(POSE_TERMS, "penetration", weight=-1.0)
-    with pytest.raises(InvalidInput, match="an object where a class is wanted"):
+    with pytest.raises(InvalidInput, match="an object where a class is expected"):
         PluginManager(discover=False).register(_Terms())
 
 

@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 
-from contact_core.edit.tell import history_lines
+from contact_core.edit.summaries import history_lines
 from contact_core.errors import FileRefused
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import COMMANDS

@@ -144,7 +144,7 @@ def test_mistakes_of_a_suite_are_told() -> None:
     def spoken(self: object) -> None:
         """Said."""
 
-    with pytest.raises(InvalidInput, match=r"test_y01_ was wanted, but test_y02_b came"):
+    with pytest.raises(InvalidInput, match=r"test_y01_ was expected, but got test_y02_b"):
         type("Y", (Contract,), {"letter": "Y", "test_y02_b": spoken})
     with pytest.raises(InvalidInput, match="needs a docstring"):
         type("Y", (Contract,), {"letter": "Y", "test_y01_b": lambda self: None})

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from contact_core.document.schema import dump_document, same_documents
 from contact_core.edit.recovery import read_document, write_document
-from contact_core.edit.tell import changes, diff_lines, history_lines, replay_lines
+from contact_core.edit.summaries import changes, diff_lines, history_lines, replay_lines
 from contact_core.errors import FileRefused
 from contact_core.session import Session
 from contact_core.testing.random_commands import random_history

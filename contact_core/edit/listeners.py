@@ -33,7 +33,7 @@ class DocumentChanged:
 Listener = Callable[[DocumentChanged], None]
 
 
-class Announcer:
+class Listeners:
     """Listeners, and what they are still to be told.
 
     A listener may edit: everybody hears of the change that it answers first, and of its own change after that, so

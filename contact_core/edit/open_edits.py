@@ -12,7 +12,7 @@ from contact_core.edit.stroke import Stroke
 from contact_core.errors import CommandRejected
 
 
-class UnderWay:
+class OpenEdits:
     """At most one stroke and one macro, of one thread. stroke, macro: None where there is none."""
 
     def __init__(self) -> None:
