@@ -20,11 +20,14 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from benchmarks import host_edits
 from benchmarks.harness import record
+from contact_core.document.asset import Asset
 from contact_core.edit.commands import Rotate
 from contact_core.edit.history import History
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.scene.memory_host import MemoryHost
 from contact_core.session import Session
 from contact_core.testing import meshes
 
@@ -45,6 +48,7 @@ def main() -> int:
             f"{many[key] / single[key]:.2f}x (bar 1.5x)"
         )
     tree(mesh)
+    in_memory_host()
     history_memory()
     record(f"Edits through the session, journal on: {name}", ROWS)
     return 0
@@ -97,6 +101,25 @@ def tree(mesh: TriangleMesh) -> None:
 
         row("rotate a tree of 10 patches of 300 points", turn, 10e-3)
         session.close(discard=True)
+
+
+def in_memory_host() -> None:
+    """Thirty patches of 500 points in the reference host, and saving as many in a document file."""
+    host = MemoryHost()
+    key = host.add(Asset("sheet", TriangleMesh(*host_edits.sheet()), meters_per_unit=1.0))
+    with host_edits.painted(host, key) as session:
+        document = session.document
+        ROWS.update({f"in the memory host: {name}": row for name, row in host_edits.edits(host, session).items()})
+    with tempfile.TemporaryDirectory() as folder, Session(document, discover=False) as session:
+        path = Path(folder) / "d.json"
+        session.save(path)
+
+        def save() -> None:
+            session.set_extra("at", session.revision)
+            session.save()
+
+        taken = host_edits.timed(save, 9)
+        ROWS["save, 30 patches of 500 points"] = f"{1e3 * taken:.1f} ms, {path.stat().st_size:,} bytes"
 
 
 def history_memory() -> None:

@@ -18,16 +18,15 @@ import numpy as np
 from pxr import Usd, UsdGeom, Vt
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from benchmarks import host_edits
 from benchmarks.harness import interleaved, record
 from contact_core.document.asset import Asset
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.session import Session
 from contact_core.testing.host_scenes import arm_rig, bent
+from contact_usd import contacts
 from contact_usd.host import UsdHost
 
 SIDE = 708  # points along one side: about a million triangles
-PATCH = 500  # points
 
 
 def seconds(work: Callable[[], object], repeats: int) -> float:
@@ -81,24 +80,24 @@ def reading(repeats: int) -> dict[str, str]:
 
 
 def editing(repeats: int) -> dict[str, str]:
-    """Patches of 500 points on a sheet in a stage, stored there with every edit: turn one, undo, key a pose."""
-    points, faces = sheet(60, quads=False)
+    """Thirty patches of 500 points on a sheet in a stage: edits, publishing what one changed, a key."""
     host = UsdHost()
-    key = host.add(Asset("sheet", TriangleMesh(points, faces), meters_per_unit=1.0))
+    key = host.add(Asset("sheet", TriangleMesh(*host_edits.sheet()), meters_per_unit=1.0))
     rig = arm_rig()
     arm = host.add(Asset("arm", rig.surface, rig, meters_per_unit=1.0))
-    session = Session(host=host, discover=False)
-    mesh = host.read_surface(key).mesh
-    session.surfaces.add("sheet", mesh)
-    middle = np.argsort(np.linalg.norm(mesh.points - [0.5, 0.5, 0.0], axis=1), kind="stable")[:PATCH]
-    patch = SurfacePoints.at_vertices(mesh, middle)
-    rows = {}
-    for count in (1, 30):
-        for number in range(len(session.document.patches), count):
-            session.patches.paint(f"patch {number}", patch, surface="sheet", axis=patch[[0, 400]])
-        turn = seconds(lambda: session.patches.rotate("patch 0", 0.01), repeats)
-        rows[f"turn a patch of {PATCH} points, one of {count}"] = spelled(turn, 0.015)
-        rows[f"undo of that, one of {count}"] = spelled(seconds(session.undo, repeats - 1))
+    session = host_edits.painted(host, key)
+    rows = host_edits.edits(host, session, repeats)
+    began = time.perf_counter()
+    contacts.publish(host, session, {"sheet": key})
+    rows["publish all patches"] = spelled(time.perf_counter() - began)
+
+    def edit_and_publish() -> None:
+        session.patches.rotate("patch 0", 0.01)
+        contacts.publish(host, session, {"sheet": key})
+
+    published = host_edits.timed(lambda: session.patches.rotate("patch 0", 0.01), repeats)
+    rows["rotate one of 30 published patches"] = spelled(published, host_edits.BAR)
+    rows["rotate one and publish what that changed"] = spelled(host_edits.timed(edit_and_publish, repeats))
     frames = iter(range(1000))
     rows["key a pose"] = spelled(seconds(lambda: host.write_pose(arm, bent(rig, 1), float(next(frames))), repeats))
     return rows

@@ -47,8 +47,7 @@ def open(  # noqa: A001 - as `pathlib.Path.open`: within this package the word m
     hosts = manager.offers(HOSTS)
     for host in hosts.values():
         if suffix in host.suffixes:
-            opened = host(path)  # type: ignore[call-arg]  # a protocol declares no constructor; README: Host(path)
-            return Session(host=opened, objects=objects, surfaces=surfaces, plugins=manager)
+            return Session(host=host.open(path), objects=objects, surfaces=surfaces, plugins=manager)
     formats = [kind for kind in manager.offers(FORMATS).values() if kind.can_read]
     if any(suffix in kind.suffixes for kind in formats):
         asset = read_asset(path, manager)

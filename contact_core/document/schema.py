@@ -10,8 +10,9 @@ from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Link
-from contact_core.contact.shape import PatchShape
+from contact_core.contact.shape import PatchCoordinates, PatchShape
 from contact_core.document.codec import Fragment, from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, Patch, is_name
 from contact_core.document.frozen_map import FrozenMap
@@ -233,12 +234,16 @@ def _cycles(document: ContactDocument) -> Iterator[str]:
         sound.update(line)
 
 
-def _content(document: ContactDocument) -> bytes:
-    """The canonical bytes of a document, without a digest.
+def shape_to_json(shape: PatchShape) -> dict[str, Any]:
+    """JSON-able data of a shape as it stands in a document, the bulk of it as text that is made once."""
+    coordinates, weights = _points_texts(shape)
+    own = {"axis": to_json(shape.axis), "meters_per_unit": float(shape.meters_per_unit)}
+    return {**own, "coordinates": coordinates, "weights": weights}
 
-    A host stores them after each edit, and an edit changes one shape at most, so the text of shapes is kept.
-    """
-    shapes = {key: _shape_text(shape) for key, shape in document.shapes.items()}
+
+def _content(document: ContactDocument) -> bytes:
+    """The canonical bytes of a document, without a digest."""
+    shapes = {key: shape_to_json(shape) for key, shape in document.shapes.items()}
     return _canonical(document_to_json(replace(document, shapes=FrozenMap())) | {"shapes": shapes})
 
 
@@ -259,14 +264,19 @@ def _disbelief(source: str, has_digest: bool) -> str:
     )
 
 
-_shape_texts: WeakKeyDictionary[PatchShape, Fragment] = WeakKeyDictionary()
+_kept_texts: WeakKeyDictionary[PatchCoordinates, tuple[FloatArray, Fragment, Fragment]] = WeakKeyDictionary()
 
 
-def _shape_text(shape: PatchShape) -> Fragment:
-    """The text of an immutable shape as it stands in a document, two levels deep."""
-    if shape not in _shape_texts:
-        _shape_texts[shape] = Fragment(pretty(to_json(shape), 2))
-    return _shape_texts[shape]
+def _points_texts(shape: PatchShape) -> tuple[Fragment, Fragment]:
+    """The texts of the coordinates and weights of a shape as they stand in a document, three levels deep.
+
+    They are kept with the coordinates, which a new axis shares: bending a patch encodes its axis alone.
+    """
+    kept = _kept_texts.get(shape.coordinates)
+    if kept is None or kept[0] is not shape.weights:
+        coordinates, weights = (Fragment(pretty(to_json(x), 3)) for x in (shape.coordinates, shape.weights))
+        kept = _kept_texts[shape.coordinates] = (shape.weights, coordinates, weights)
+    return kept[1:]
 
 
 def _object_of(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

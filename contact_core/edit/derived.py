@@ -122,7 +122,11 @@ class Derived:
                 unit=self.unit(document, name),
             )
 
-        return self._cached(("points", self._axis_key(document, name), coordinates.digest), len(coordinates), trace)
+        return self._cached(("points", *self.key(document, name)), len(coordinates), trace)
+
+    def key(self, document: ContactDocument, name: str) -> tuple[Hashable, ...]:
+        """All that the axis and points of a patch depend on, by value: where it is the same, so are they."""
+        return self._axis_key(document, name), document.shape_of(name).coordinates.digest
 
     def _root_and_cut(self, document: ContactDocument, name: str) -> tuple[Root, float]:
         """The root, and the length that boundaries cut off on the way to it from the parents (0 without)."""

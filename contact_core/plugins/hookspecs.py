@@ -44,7 +44,7 @@ def contact_geodesic_engines() -> Offers:
     """Engines for distances, log maps and traces: `geometry.engine.GeodesicEngine`."""
 @hookspec
 def contact_hosts() -> Offers:
-    """Hosts: DCCs, stages, viewers: `scene.host.HostAdapter` (classes; a host is opened by its own constructor)."""
+    """Hosts: DCCs, stages, viewers: `scene.host.HostAdapter` (classes; `Host.open(path)` opens a file)."""
 @hookspec
 def contact_tools() -> Offers:
     """Tools for pointer and keys: `interaction.tool.Tool`."""

@@ -11,14 +11,17 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, Self, runtime_checkable
 
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
+from contact_core.document.document import ContactDocument
+from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.parts import NO_PARTS, DocumentParts
 from contact_core.document.schema import VERSION
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
@@ -47,24 +50,48 @@ class SceneObject:
 
 
 @dataclass(frozen=True)
-class StoredDocument:
-    """A document as a host keeps it: opaque bytes, the history's revision, and the schema number of the bytes."""
+class DocumentStamp:
+    """What a stored document is known by: its history's revision, the digest of its content, its schema number."""
 
-    data: bytes
     revision: int
+    digest: str
     schema: int
+
+
+@dataclass(frozen=True)
+class StoredDocument:
+    """A document as a host keeps it: its stamp, and parts by key that are opaque to the host (`document.parts`).
+
+    A key is an identifier of at most 63 characters, a text printable ASCII with line feeds.
+    """
+
+    stamp: DocumentStamp
+    parts: Mapping[str, str]
+
+    @classmethod
+    def of(cls, document: ContactDocument, revision: int) -> StoredDocument:
+        """A document as a session stores it."""
+        parts, change = NO_PARTS.to(document)
+        return cls(DocumentStamp(revision, parts.digest, VERSION), FrozenMap(change.put))
+
+    def read(self, source: str) -> DocumentParts:
+        """What it says. Raises FileRefused where it is damaged, or of a newer schema."""
+        return DocumentParts.read(self.parts, self.stamp.schema, self.stamp.digest, source)
 
 
 @runtime_checkable
 class HostAdapter(Protocol):
-    """What every host is: `Host(path)` opens a file, `Host()` a new scene, or inside a DCC the open one.
-
-    Opening changes nothing in the scene. Raises FileRefused.
-    """
+    """What every host is. How it is made is its own: `Host()` is a new scene, or inside a DCC the open one."""
 
     name: str  # "memory", "usd", "blender"
     summary: str  # in a few words, what its scenes are
     suffixes: tuple[str, ...]  # of files that it opens, lower case: (".usda", ".usdc")
+
+    @classmethod
+    @abstractmethod
+    def open(cls, path: Path) -> Self:
+        """The host on the scene in a file. Opening changes nothing in the scene. Raises FileRefused."""
+        ...
 
     @abstractmethod
     def space(self) -> SceneSpace: ...
@@ -137,13 +164,22 @@ class DocumentStorage(HostAdapter, Protocol):
     """The document lives in the host's own file."""
 
     @abstractmethod
+    def stored_stamp(self) -> DocumentStamp | None:
+        """The stamp of what is stored, without its parts: sessions ask for it before each edit."""
+        ...
+
+    @abstractmethod
     def stored_document(self) -> StoredDocument | None:
         """What is stored, bit for bit, also under a schema that this core does not know."""
         ...
 
     @abstractmethod
-    def store_document(self, document: StoredDocument) -> None:
-        """Replace it. Raises FileRefused, keeping the old one, where that has a newer schema than ours."""
+    def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
+        """Change what is stored: the stamp, parts that are new or replaced, and keys of parts that go.
+
+        All other parts stay as they are, and the cost is that of what changes. Raises FileRefused, changing
+        nothing, where what is stored has a newer schema than ours, or is damaged.
+        """
         ...
 
     @abstractmethod
@@ -235,11 +271,11 @@ CAPABILITIES: dict[str, type] = {
 }
 
 
-def check_overwrite(stored: StoredDocument | None) -> None:
+def check_overwrite(stamp: DocumentStamp | None) -> None:
     """What `store_document` asks first. Raises FileRefused where a newer contact-core wrote what is stored."""
-    if stored is not None and stored.schema > VERSION:
+    if stamp is not None and stamp.schema > VERSION:
         raise FileRefused(
-            f"the scene holds a document of schema version {stored.schema}, but this release writes version"
+            f"the scene holds a document of schema version {stamp.schema}, but this release writes version"
             f" {VERSION}: install a newer contact-core. What is stored was left untouched."
         )
 

@@ -8,16 +8,11 @@ from pathlib import Path
 from typing import Protocol
 
 from contact_core.document.document import ContactDocument
-from contact_core.document.schema import (
-    VERSION,
-    document_digest,
-    dump_with_digest,
-    parse_document,
-    stated_digest,
-)
+from contact_core.document.parts import NO_PARTS, DocumentParts
+from contact_core.document.schema import VERSION
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected, FileRefused
-from contact_core.scene.host import DocumentStorage, HostAdapter, StoredDocument, Undo
+from contact_core.scene.host import DocumentStamp, DocumentStorage, HostAdapter, Undo
 
 
 class FollowingSession(Protocol):
@@ -37,10 +32,10 @@ class FollowingSession(Protocol):
 class HostLink:
     """Keeps a host and a session in step, by what the host can do: storing documents, undo, neither.
 
-    The host stores the document, which states its own digest, and its revision. What a session last saw in the host
-    is known by both: a revision alone is a number that another session may have used, too. After an undo of the
-    host, foreign steps included, the session goes to what the host holds; a document that the history does not know
-    becomes its new beginning.
+    The host stores the document in parts under a stamp: its revision and the digest of its content. What a session
+    last saw in the host is known by both: a revision alone is a number that another session may have used, too.
+    After an undo of the host, foreign steps included, the session goes to what the host holds; a document that the
+    history does not know becomes its new beginning.
     """
 
     def __init__(self, session: FollowingSession, host: HostAdapter) -> None:
@@ -49,7 +44,9 @@ class HostLink:
         self._undo = host if isinstance(host, Undo) and self._storage is not None else None
         self._stop: Callable[[], None] | None = None
         self._began_in_host = False  # the history starts at a document that the host stored
-        self._digests: dict[int, str | None] = {}  # by revision, of what was stored or found in the host
+        self._digests: dict[int, str] = {}  # by revision, of what was stored or found in the host
+        self._found = NO_PARTS  # of the document that was found in the host last
+        self._parts = NO_PARTS  # of the document that was stored or found last
 
     def listen(self) -> None:
         """Follow the host's undo from now on, until `close`."""
@@ -69,20 +66,20 @@ class HostLink:
     def stored_history(self) -> History | None:
         """A history that starts at the document in the host, None where there is none.
 
-        Raises FileRefused for one that a newer release wrote; it stays untouched.
+        Raises FileRefused for one that is damaged or that a newer release wrote; it stays untouched.
         """
-        stored = self._stored()
-        self._began_in_host = stored is not None
-        if stored is None:
+        stamp = self._stamp()
+        self._began_in_host = stamp is not None
+        if stamp is None:
             return None
-        if stored.schema > VERSION:
+        if stamp.schema > VERSION:
             raise FileRefused(
-                f"the scene holds a document of schema version {stored.schema}, but this release reads up to"
+                f"the scene holds a document of schema version {stamp.schema}, but this release reads up to"
                 f" {VERSION}: install a newer contact-core. It is left untouched."
             )
-        document = parse_document(stored.data, "the document in the scene")
-        self._digests = {stored.revision: stated_digest(stored.data)}
-        return History(document, stored.revision)
+        self._found = self._parts = self._stored_parts()
+        self._digests = {stamp.revision: stamp.digest}
+        return History(self._parts.document, stamp.revision)
 
     def joined_history(self, document: ContactDocument, origin: str) -> History | None:
         """The history in the host for a session that brings a document of its own, None where the host has none.
@@ -90,11 +87,8 @@ class HostLink:
         origin: what the document is called in words. Raises FileRefused where the host holds other contacts: one
         would overwrite the other.
         """
-        stored = self._stored()
-        if stored is None:
-            return None
-        history = self.stored_history()
-        if document_digest(document) != self._digests[stored.revision]:
+        history, stamp = self.stored_history(), self._stamp()
+        if stamp is not None and DocumentParts.of(document).digest != stamp.digest:
             raise FileRefused(
                 f"the scene holds contacts of its own, and {origin} holds others: open the scene's with"
                 " Session(host=host), and bring the others in with sets.read."
@@ -107,9 +101,8 @@ class HostLink:
         Raises CommandRejected where another session or script has stored contacts there; the session goes on with
         those.
         """
-        stored = self._stored()
-        known = self._digests.get(self._session.revision)
-        if stored is None or (stored.revision == self._session.revision and stated_digest(stored.data) == known):
+        stamp = self._stamp()
+        if stamp is None or (stamp.revision == self._session.revision and self._knows(stamp)):
             return
         self.follow()
         raise CommandRejected(
@@ -119,15 +112,15 @@ class HostLink:
 
     @contextlib.contextmanager
     def recording(self, label: str, document: ContactDocument, revision: int) -> Iterator[None]:
-        """One host undo step in which the document is stored and the caller commits."""
+        """One host undo step in which what the document changes is stored and the caller commits."""
         if self._storage is None:
             yield
             return
-        data, digest = dump_with_digest(document)
+        parts, change = self._held_parts().to(document)
         with self._undo.step(label) if self._undo is not None else contextlib.nullcontext():
-            self._storage.store_document(StoredDocument(data, revision, VERSION))
+            self._storage.store_document(DocumentStamp(revision, parts.digest, VERSION), change.put, change.removed)
             yield
-        self._digests[revision] = digest
+        self._parts, self._digests[revision] = parts, parts.digest
 
     def undo(self) -> None:
         """The host's undo. Raises CommandRejected when the host has nothing to undo."""
@@ -143,13 +136,13 @@ class HostLink:
 
     def follow(self) -> None:
         """Go to the document that the host holds now."""
-        session, stored = self._session, self._stored()
-        if stored is None and self._began_in_host:  # undone past the beginning of all that was ever stored
+        session, stamp = self._session, self._stamp()
+        if stamp is None and self._began_in_host:  # undone past the beginning of all that was ever stored
             self._began_in_host = False
             session.adopt(History(ContactDocument()))
             return
-        revision = stored.revision if stored is not None else session.history.base_revision
-        known = stored is None or self._digests.get(revision) == stated_digest(stored.data)
+        revision = stamp.revision if stamp is not None else session.history.base_revision
+        known = stamp is None or self._knows(stamp)
         if known and revision == session.revision:
             return
         if known and session.history.holds(revision):
@@ -158,8 +151,34 @@ class HostLink:
         found = self.stored_history()
         session.adopt(found if found is not None else History(ContactDocument(), revision))
 
-    def _stored(self) -> StoredDocument | None:
-        return self._storage.stored_document() if self._storage is not None else None
+    def _stamp(self) -> DocumentStamp | None:
+        return self._storage.stored_stamp() if self._storage is not None else None
+
+    def _knows(self, stamp: DocumentStamp) -> bool:
+        """Whether this session stored or read just that."""
+        return self._digests.get(stamp.revision) == stamp.digest
+
+    def _held_parts(self) -> DocumentParts:
+        """The parts of what the host holds now; an undo may have led to another document of the history.
+
+        Raises FileRefused where it is damaged.
+        """
+        stamp, history = self._stamp(), self._session.history
+        if stamp is None:
+            return NO_PARTS
+        for known in (self._parts, self._found):
+            if known.digest == stamp.digest:
+                return known
+        if history.holds(stamp.revision):
+            parts, _ = self._parts.to(history.document_at(stamp.revision))
+            if parts.digest == stamp.digest:
+                return parts
+        return self._stored_parts()
+
+    def _stored_parts(self) -> DocumentParts:
+        """What the host holds, read whole. Raises FileRefused where it is damaged or of a newer schema."""
+        stored = self._storage.stored_document() if self._storage is not None else None
+        return NO_PARTS if stored is None else stored.read("the document in the scene")
 
     def saves(self, path: Path | str | None) -> bool:
         """Whether the host keeps the document, and writes files of that name."""

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.document.asset import Asset
+from contact_core.document.frozen_map import FrozenMap
 from contact_core.errors import Cancelled, FileRefused, InvalidInput
 from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
@@ -24,6 +25,7 @@ from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.scene.camera import camera_of
 from contact_core.scene.host import (
     Display,
+    DocumentStamp,
     DocumentStorage,
     Picking,
     PoseWriting,
@@ -77,6 +79,10 @@ class MemoryHost(
         self.picture: Picture | None = None
         self.told: list[tuple[float | None, str]] = []  # progress so far
         self._cancel_asked = False
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        return cls(path)
 
     @property
     def scene(self) -> MemoryScene:
@@ -174,12 +180,17 @@ class MemoryHost(
 
     # The document
 
+    def stored_stamp(self) -> DocumentStamp | None:
+        return None if self._scene.document is None else self._scene.document.stamp
+
     def stored_document(self) -> StoredDocument | None:
         return self._scene.document
 
-    def store_document(self, document: StoredDocument) -> None:
-        check_overwrite(self._scene.document)
-        self._replace("Document", replace(self._scene, document=document))
+    def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
+        check_overwrite(self.stored_stamp())
+        stored = self._scene.document
+        parts = FrozenMap[str]({} if stored is None else stored.parts).without(*remove).updated(put)
+        self._replace("Document", replace(self._scene, document=StoredDocument(stamp, parts)))
 
     def save(self, path: Path | None = None) -> None:
         self._path = self._path if path is None else Path(path)

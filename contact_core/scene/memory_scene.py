@@ -15,12 +15,13 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.atomic_file import write_atomic
+from contact_core.document.frozen_map import FrozenMap
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.rig.rig import JointFreedom, Pose, Rig
-from contact_core.scene.host import SceneSpace, StoredDocument
+from contact_core.scene.host import DocumentStamp, SceneSpace, StoredDocument
 
 FORMAT = "contact-core.memory-scene"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 1 held the document in one piece
 MAX_BYTES = 1 << 32  # of arrays in one file: beyond any scene, below a zip bomb
 _FREEDOM_ARRAYS = ("frame", "lower", "upper", "prior_weight", "locked")
 _RIG_ARRAYS = (
@@ -130,8 +131,9 @@ def save_scene(scene: MemoryScene, path: Path) -> None:
     header: dict[str, Any] = {"format": FORMAT, "version": FORMAT_VERSION, "objects": objects}
     header["space"] = [space.meters_per_unit, space.up_axis, space.frames_per_second]
     if scene.document is not None:
-        header["document"] = [scene.document.revision, scene.document.schema]
-        arrays["document"] = np.frombuffer(scene.document.data, np.uint8)
+        stamp = scene.document.stamp
+        header["document"] = [stamp.revision, stamp.digest, stamp.schema]
+        arrays["document"] = np.frombuffer(json.dumps(dict(scene.document.parts)).encode(), np.uint8)
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     stream = io.BytesIO()
     np.savez(stream, **arrays)
@@ -163,10 +165,17 @@ def _scene_from_arrays(arrays: dict[str, Any], path: Path) -> MemoryScene:
         )
     document = None
     if "document" in header:
-        revision, schema = header["document"]
-        document = StoredDocument(arrays["document"].tobytes(), revision, schema)
+        document = StoredDocument(_stamp(*header["document"]), _parts(json.loads(arrays["document"].tobytes())))
     objects = {key: _object_from_json(data, arrays) for key, data in header["objects"].items()}
     return MemoryScene(SceneSpace(*header["space"]), objects, document)
+
+
+def _stamp(revision: int, digest: str, schema: int) -> DocumentStamp:
+    return DocumentStamp(int(revision), str(digest), int(schema))
+
+
+def _parts(data: Mapping[str, Any]) -> FrozenMap[str]:
+    return FrozenMap({str(key): str(text) for key, text in data.items()})
 
 
 def _object_to_json(prefix: str, item: MemoryObject, arrays: dict[str, Any]) -> dict[str, Any]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from contact_core.arrays import FloatArray, digest
+from contact_core.document.schema import VERSION
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import Pose, Rig
-from contact_core.scene.host import DocumentStorage, PoseWriting, RigReading
+from contact_core.scene.host import DocumentStamp, DocumentStorage, PoseWriting, RigReading, StoredDocument
 from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing.host_scenes import HostScene
 
@@ -26,8 +28,20 @@ def object_id(host: Any, name: str) -> str:
 
 def revision_of(host: Any) -> int | None:
     """The stored document's revision."""
-    stored = host.stored_document()
-    return None if stored is None else stored.revision
+    stamp = host.stored_stamp()
+    return None if stamp is None else int(stamp.revision)
+
+
+def stored(revision: int, parts: Mapping[str, str] | None = None, schema: int = VERSION) -> StoredDocument:
+    """What a host may be given to keep: it believes the digest, and does not read the parts."""
+    return StoredDocument(DocumentStamp(revision, f"{revision:064x}", schema), dict(parts or {}))
+
+
+def store(host: Any, document: StoredDocument) -> None:
+    """Let a host hold that and no more."""
+    before = host.stored_document()
+    gone = () if before is None else set(before.parts) - set(document.parts)
+    host.store_document(document.stamp, document.parts, gone)
 
 
 def surfaces_of(host: Any) -> dict[str, str]:

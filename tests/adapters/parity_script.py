@@ -105,7 +105,7 @@ def run(host: Any, joint: str, path: Path) -> Outcome:
     session.close()
     (pair,) = session.geometry.pairs()
     target = pair.object_points.positions(ball) @ place[:3, :3].T + place[:3, 3]
-    return _outcome(type(host)(path), ids, rig, session, pair.manipulator_points, target)
+    return _outcome(type(host).open(path), ids, rig, session, pair.manipulator_points, target)
 
 
 def _outcome(

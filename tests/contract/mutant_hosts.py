@@ -9,11 +9,11 @@ import importlib.util
 import os
 import sys
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.polar import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
-from contact_core.scene.host import SceneObject, SceneSpace, StoredDocument
+from contact_core.scene.host import DocumentStamp, SceneObject, SceneSpace
 from contact_core.scene.memory_host import MemoryHost
 from contact_core.testing.host_contract import Build, HostContract
 from contact_core.testing.host_scenes import HostScene
@@ -290,13 +290,46 @@ class TestKeysEveryFrameBefore(Mutant, OnMemory):
                     super().write_pose(object_id, pose, 0.0)
 
 
-class TestTakesDocumentsForText(Mutant, OnMemory):
+class TestStripsTexts(Mutant, OnMemory):
+    breaks = "H19"
+    consequences = ("H37",)
+
+    class Host(MemoryHost):
+        def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
+            super().store_document(stamp, {key: text.strip() for key, text in put.items()}, remove)
+
+
+class TestKeepsTheNewPartsAlone(Mutant, OnMemory):
+    breaks = "H19"
+    consequences = ("H37",)
+
+    class Host(MemoryHost):
+        def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
+            stored = self.stored_document()
+            super().store_document(stamp, put, () if stored is None else stored.parts)
+
+
+class TestRemovesNoPart(Mutant, OnMemory):
     breaks = "H19"
 
     class Host(MemoryHost):
-        def store_document(self, document: StoredDocument) -> None:
-            text = document.data.decode("utf-8", errors="replace")
-            super().store_document(replace(document, data=text.encode()))
+        def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
+            super().store_document(stamp, put)
+
+
+class TestKeepsAStaleStampAfterUndo(Mutant, OnMemory):
+    breaks = "H25"
+    consequences = ("H26", "H36", "H37")
+
+    class Host(MemoryHost):
+        known: DocumentStamp | None = None
+
+        def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
+            super().store_document(stamp, put, remove)
+            self.known = stamp
+
+        def stored_stamp(self) -> DocumentStamp | None:
+            return self.known or super().stored_stamp()
 
 
 class TestSavesWithoutTheDocument(Mutant, OnMemory):
@@ -316,9 +349,13 @@ class TestEatsDocumentsOfTheFuture(Mutant, OnMemory):
     breaks = "H21"
 
     class Host(MemoryHost):
-        def store_document(self, document: StoredDocument) -> None:
+        def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
             with self.step("Document"):
-                self._scene = replace(self._scene, document=document)
+                whole = self._scene.document
+                if whole is not None:
+                    known = replace(whole, stamp=replace(whole.stamp, schema=1))
+                    self._scene = replace(self._scene, document=known)
+                super().store_document(stamp, put, remove)
 
 
 class TestDropsDocumentsOfTheFutureOnSave(Mutant, OnMemory):
@@ -327,7 +364,7 @@ class TestDropsDocumentsOfTheFutureOnSave(Mutant, OnMemory):
     class Host(MemoryHost):
         def save(self, path: Path | None = None) -> None:
             whole = self._scene
-            if whole.document is not None and whole.document.schema > 1:
+            if whole.document is not None and whole.document.stamp.schema > 1:
                 self._scene = replace(whole, document=None)
             try:
                 super().save(path)
@@ -339,11 +376,12 @@ class TestOpensHalfAFile(Mutant, OnMemory):
     breaks = "H23"
 
     class Host(MemoryHost):
-        def __init__(self, path: Path | None = None, **options: Any) -> None:
+        @classmethod
+        def open(cls, path: Path) -> Self:
             try:
-                super().__init__(path, **options)
+                return super().open(path)
             except FileRefused:
-                super().__init__(**options)
+                return cls()
 
 
 class TestMakesTwoStepsOfOne(Mutant, OnMemory):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
 from contact_core.scene.host import (
     Display,
+    DocumentStamp,
     DocumentStorage,
     PoseWriting,
     ProgressDisplay,
@@ -88,6 +89,11 @@ class BlenderHost(
         self._shows_progress = False
         self._known: dict[str, _KnownRig] = {}
         storage.restore_ids(bpy.context.scene, self._ids)
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """The host on a .blend, which replaces what was open in this process."""
+        return cls(path)
 
     def space(self) -> SceneSpace:
         scene = bpy.context.scene
@@ -191,14 +197,16 @@ class BlenderHost(
 
     # The document
 
+    def stored_stamp(self) -> DocumentStamp | None:
+        return storage.read_stamp(bpy.context.scene)
+
     def stored_document(self) -> StoredDocument | None:
         return storage.read(bpy.context.scene)
 
-    def store_document(self, document: StoredDocument) -> None:
+    def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
         with self.step("Contact document"):
-            put_back = storage.remember(bpy.context.scene)
-            storage.write(bpy.context.scene, document, self._ids.pairs())
-            self._undo.wrote(lambda: put_back(bpy.context.scene, self._ids))
+            take_back = storage.write(bpy.context.scene, stamp, put, remove, self._ids.pairs())
+            self._undo.wrote(lambda: take_back(bpy.context.scene, self._ids))
 
     def save(self, path: Path | None = None) -> None:
         target = str(bpy.data.filepath) if path is None else str(Path(path).resolve())

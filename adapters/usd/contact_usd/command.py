@@ -69,7 +69,7 @@ def _need_pxr() -> None:
 
 
 def _inspect(arguments: argparse.Namespace) -> int:
-    from contact_core.document.schema import VERSION, parse_document
+    from contact_core.document.schema import VERSION
     from contact_usd.host import UsdHost
     from contact_usd.validate import problems
 
@@ -84,9 +84,10 @@ def _inspect(arguments: argparse.Namespace) -> int:
         "notes": list(space.notes),
     }
     if stored is not None:
-        facts["document"] = {"revision": stored.revision, "schema": stored.schema, "bytes": len(stored.data)}
-        if stored.schema <= VERSION:
-            document = parse_document(stored.data)
+        size = sum(map(len, stored.parts.values()))
+        facts["document"] = {"revision": stored.stamp.revision, "schema": stored.stamp.schema, "bytes": size}
+        if stored.stamp.schema <= VERSION:
+            document = stored.read("the document in the stage").document
             facts["document"] |= {"patches": sorted(document.patches), "pairs": sorted(document.pairs)}
     if arguments.validate:
         facts["problems"] = list(problems(host.stage))

@@ -11,7 +11,8 @@ authored and found again by its property, so all of it can be read without our s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument, ContactPair
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.transform import transform_points
 from contact_core.session import Session
@@ -29,6 +31,7 @@ from contact_usd.storage import ROOT, contacts_prim
 
 PATCHES, PAIRS = ROOT.AppendChild("Patches"), ROOT.AppendChild("Pairs")
 _SIZE = 0.35  # width of a drawn point, of the mean spacing of the patch's points
+_SOURCE = "contact:source"
 _TYPES = Sdf.ValueTypeNames
 
 
@@ -58,24 +61,23 @@ class PairPrim:
 def publish(host: UsdHost, session: Session, prims: Mapping[str, str]) -> None:
     """Write the session's patches, axes and pairs in place of those published before: one undo step.
 
-    prims: path of the Mesh or Skeleton behind each of the document's surfaces. Raises InvalidInput for a patch on
-    a surface that `prims` does not name.
+    Each prim says what it was made from, and what would be made from the same is left as it is. prims: path of the
+    Mesh or Skeleton behind each of the document's surfaces. Raises InvalidInput for a patch on a surface that
+    `prims` does not name.
     """
     document = session.document
     missing = sorted({patch.surface for patch in document.patches.values()} - set(prims))
     if missing:
         raise InvalidInput(f"publishing needs the prim of the surface {missing[0]!r}; given are {sorted(prims)}.")
     paths = {name: PATCHES.AppendChild(key) for name, key in _identifiers(document.patches).items()}
+    pairs = {name: PAIRS.AppendChild(key) for name, key in _identifiers(document.pairs).items()}
     with host.step("Publish contacts"), Usd.EditContext(host.stage, Usd.EditTarget(host.layer)):
-        for scope in (PATCHES, PAIRS):
-            host.stage.RemovePrim(scope)
         contacts_prim(host.layer)
-        for scope in (PATCHES, PAIRS):
-            UsdGeom.Scope.Define(host.stage, scope)
-        for name, path in paths.items():
-            _write_patch(host.stage, path, session, name, Sdf.Path(prims[document.patches[name].surface]))
-        for name, key in _identifiers(document.pairs).items():
-            _write_pair(host.stage, PAIRS.AppendChild(key), name, document.pairs[name], paths)
+        _keep_only(host, PATCHES, {*paths.values(), *map(_axis_path, paths.values())})
+        _keep_only(host, PAIRS, set(pairs.values()))
+        _write_patches(host, session, prims, paths)
+        for name, path in pairs.items():
+            _write_pair(host, path, name, document.pairs[name], paths)
         _hide_those_below(host.stage, host.layer)
 
 
@@ -133,14 +135,38 @@ def read_pairs(stage: Usd.Stage) -> tuple[PairPrim, ...]:
     return tuple(found)
 
 
-def _write_pair(
-    stage: Usd.Stage, path: Sdf.Path, name: str, pair: ContactPair, paths: Mapping[str, Sdf.Path]
-) -> None:
-    prim = UsdGeom.Scope.Define(stage, path).GetPrim()
+def _keep_only(host: UsdHost, scope: Sdf.Path, wanted: Collection[Sdf.Path]) -> None:
+    """Have the scope, without what we published there of things that the document no longer has."""
+    if not host.stage.GetPrimAtPath(scope):
+        UsdGeom.Scope.Define(host.stage, scope)
+    spec = host.layer.GetPrimAtPath(scope)
+    for path in [child.path for child in spec.nameChildren if child.path not in wanted] if spec is not None else []:
+        host.stage.RemovePrim(path)
+
+
+def _made_from(layer: Sdf.Layer, path: Sdf.Path) -> str:
+    """What our layer's prim there says it was made from, "" where there is none, or one that `key` has changed."""
+    spec = layer.GetAttributeAtPath(path.AppendProperty(_SOURCE))
+    keyed = layer.GetNumTimeSamplesForPath(path.AppendProperty("points"))
+    return "" if spec is None or keyed else str(spec.default)
+
+
+def _source(*data: object) -> str:
+    """Digest of what a prim is made from: plain values, whose texts say all of them."""
+    return hashlib.sha256(repr(data).encode()).hexdigest()
+
+
+def _write_pair(host: UsdHost, path: Sdf.Path, name: str, pair: ContactPair, paths: Mapping[str, Sdf.Path]) -> None:
+    ends = {end: paths[getattr(pair, end)] for end in ("manipulator", "object")}
+    source = _source(name, sorted(map(str, ends.items())), pair.weight)
+    if _made_from(host.layer, path) == source:
+        return
+    prim = UsdGeom.Scope.Define(host.stage, path).GetPrim()
     prim.AddAppliedSchema("ContactPairAPI")
     _text(prim, "contact:name", name)
-    prim.CreateRelationship("contact:manipulator", False).SetTargets([paths[pair.manipulator]])
-    prim.CreateRelationship("contact:object", False).SetTargets([paths[pair.object]])
+    _text(prim, _SOURCE, source)
+    for end, target in ends.items():
+        prim.CreateRelationship(f"contact:{end}", False).SetTargets([target])
     prim.CreateAttribute("contact:weight", _TYPES.Float, False, Sdf.VariabilityUniform).Set(pair.weight)
 
 
@@ -153,12 +179,42 @@ def _hide_those_below(stage: Usd.Stage, layer: Sdf.Layer) -> None:
                 prim.SetActive(ours)
 
 
-def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, surface_path: Sdf.Path) -> None:
-    patch = session.document.patches[name]
+def _write_patches(
+    host: UsdHost, session: Session, prims: Mapping[str, str], paths: Mapping[str, Sdf.Path]
+) -> None:
+    """Every patch that our layer does not have as it is now."""
+    document = session.document
+    meshes = {
+        name: session.geometry.posed_mesh(name) for name in {patch.surface for patch in document.patches.values()}
+    }
+    for name, path in paths.items():
+        patch = document.patches[name]
+        mesh, surface = meshes[patch.surface], document.surfaces[patch.surface]
+        world, target = surface.world_from_surface, prims[patch.surface]
+        look = (name, patch.color, patch.original, surface.topology_digest, mesh.digest, world.tolist(), target)
+        source = _source(*look, session.derived.key(document, name))
+        if _made_from(host.layer, path) != source:
+            _write_patch(host, path, session, name, mesh, Sdf.Path(target), source)
+
+
+def _write_patch(
+    host: UsdHost,
+    path: Sdf.Path,
+    session: Session,
+    name: str,
+    mesh: TriangleMesh,
+    surface_path: Sdf.Path,
+    source: str,
+) -> None:
+    """mesh: what the animator sees; the triangles are those of the rest pose."""
+    stage, patch = host.stage, session.document.patches[name]
     surface = session.document.surfaces[patch.surface]
-    mesh = session.geometry.posed_mesh(patch.surface)  # what the animator sees; its triangles are those at rest
     points = session.geometry.reconstruction(name).points
     positions = _placed(points.positions(mesh), surface.world_from_surface)
+    axis, curve_path = session.geometry.axis(name).points, _axis_path(path)
+    is_curve = len(axis) > 1
+    for old in (path, curve_path):
+        stage.RemovePrim(old)
     drawn = UsdGeom.Points.Define(stage, path)
     prim = drawn.GetPrim()
     prim.AddAppliedSchema("ContactPatchAPI")
@@ -167,21 +223,18 @@ def _write_patch(stage: Usd.Stage, path: Sdf.Path, session: Session, name: str, 
     _write_points(drawn, positions, points, patch.color)
     _text(prim, "contact:name", name)
     _text(prim, "contact:topology", surface.topology_digest)
+    _text(prim, _SOURCE, source)
     role = "original" if patch.original else "transferred"
     prim.CreateAttribute("contact:role", _TYPES.Token, False, Sdf.VariabilityUniform).Set(role)
     prim.CreateRelationship("contact:surface", False).SetTargets([surface_path])
-    axis = session.geometry.axis(name).points
-    targets = []
-    if len(axis) > 1:
-        curve_path = _axis_path(path)
+    if is_curve:
         curves = UsdGeom.BasisCurves.Define(stage, curve_path)
         curves.CreateTypeAttr(UsdGeom.Tokens.linear)
         curves.CreateCurveVertexCountsAttr(Vt.IntArray([len(axis)]))
         curves.CreateWidthsAttr(Vt.FloatArray([_SIZE * spacing]))
         curves.SetWidthsInterpolation(UsdGeom.Tokens.constant)
         _write_points(curves, _placed(axis.positions(mesh), surface.world_from_surface), axis, patch.color)
-        targets = [curve_path]
-    prim.CreateRelationship("contact:axis", False).SetTargets(targets)
+    prim.CreateRelationship("contact:axis", False).SetTargets([curve_path] if is_curve else [])
 
 
 def _axis_path(path: Sdf.Path) -> Sdf.Path:

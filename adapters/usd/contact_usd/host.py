@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from contact_core.errors import InvalidInput, MissingExtra
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
 from contact_core.scene.host import (
+    DocumentStamp,
     DocumentStorage,
     PoseWriting,
     RigReading,
@@ -70,6 +72,10 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         self._undo = LayerUndo(self._owned.layer)
         # Any layer may change what is bound to what, not only ours: a DCC edits its own at any time.
         self._key = Tf.Notice.Register(Usd.Notice.ObjectsChanged, self._forget, self._owned.stage)
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        return cls(path)
 
     @classmethod
     def on(cls, stage: Usd.Stage) -> UsdHost:
@@ -174,14 +180,21 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
 
     # The document
 
+    def stored_stamp(self) -> DocumentStamp | None:
+        return storage.read_stamp(self.stage)
+
     def stored_document(self) -> StoredDocument | None:
         return storage.read(self.stage)
 
-    def store_document(self, document: StoredDocument) -> None:
-        schema = storage.read_schema(self.stage)
-        check_overwrite(None if schema is None else StoredDocument(b"", 0, schema))
-        with self.step("Document"):
-            storage.write(self.layer, document)
+    def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
+        check_overwrite(self.stored_stamp())
+        gone = tuple(remove)
+        with contextlib.ExitStack() as stack:
+            if not storage.is_in(self.layer):
+                stack.enter_context(self.step("Document"))
+                storage.take_over(self.stage, self.layer)
+            stack.enter_context(self._undo.writing("Document", storage.attributes(put, gone)))
+            storage.write(self.layer, stamp, put, gone)
 
     def save(self, path: Path | None = None) -> None:
         stage_io.save(self._owned, stage_io.default_target(self._owned) if path is None else Path(path))

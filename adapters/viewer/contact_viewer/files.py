@@ -18,7 +18,7 @@ from contact_core.arrays import FloatArray
 from contact_core.atomic_file import read_bounded
 from contact_core.document.asset import Asset
 from contact_core.document.document import ContactDocument
-from contact_core.document.schema import VERSION, dump_document, parse_document
+from contact_core.document.schema import parse_document
 from contact_core.errors import FileRefused
 from contact_core.geometry.transform import transform_points
 from contact_core.opening import DOCUMENT_SUFFIX
@@ -89,7 +89,7 @@ def _session_in(host: ViewerHost, plugins: PluginManager, document: ContactDocum
             if missing:
                 raise FileRefused(" ".join(missing))
             posing.binding.write(posing.document.poses)
-        stored = StoredDocument(dump_document(document), 0, VERSION)
+        stored = StoredDocument.of(document, 0)
         host = ViewerHost(scene=replace(bare.scene, document=stored), path=host.path)
     return _opened(ViewerHost(scene=host.scene, path=host.path), plugins)
 

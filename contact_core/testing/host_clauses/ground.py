@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 
 import pytest
 
-from contact_core.document.schema import VERSION
 from contact_core.scene.host import SceneSpace, StoredDocument
-from contact_core.testing.host_checks import object_id, readable_state
+from contact_core.testing.host_checks import object_id, readable_state, store, stored
 from contact_core.testing.host_scenes import HostScene, bent, contract_scene
 
 Build = Callable[[HostScene], Any]  # Any: which capabilities a host has is what is tested
@@ -28,9 +27,9 @@ class HostGround:
         return build(contract_scene(self.spaces[0]))
 
     def reopen(self, host: Any, path: Path) -> Any:
-        """Save the host's scene and open it anew; override where a host opens files otherwise."""
+        """Save the host's scene and open it anew."""
         host.save(path)
-        return type(host)(path)
+        return type(host).open(path)
 
     def foreign_edit(self, host: Any) -> None:
         """One undoable edit that is none of ours, made with the host's own means, as its user would."""
@@ -42,8 +41,8 @@ class HostGround:
 
     def furnish(self, host: Any) -> StoredDocument:
         """Store a document and, where the host can, a pose and a key."""
-        document = StoredDocument(b'{"a": 1}', 5, VERSION)
-        host.store_document(document)
+        document = stored(5, {"a": '{"a": 1}', "b": '{"b": 2}'})
+        store(host, document)
         if "poses" not in self.cannot:
             rig_id = object_id(host, "arm")
             rig = host.read_rig(rig_id).rig
@@ -55,7 +54,7 @@ class HostGround:
     def write_step(self, host: Any, revision: int) -> None:
         """One step that stores a document and, where the host can, poses."""
         with host.step(f"Step {revision}"):
-            host.store_document(StoredDocument(b"%d" % revision, revision, VERSION))
+            store(host, stored(revision, {"all": "{}", f"only_{revision}": str(revision)}))
             if "poses" not in self.cannot:
                 rig_id = object_id(host, "arm")
                 host.write_pose(rig_id, bent(host.read_rig(rig_id).rig, revision))

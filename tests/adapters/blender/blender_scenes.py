@@ -79,7 +79,13 @@ def whole_state() -> Any:
     kept = sorted(bpy.context.scene.keys())
     datablocks = [len(bpy.data.scenes), len(bpy.data.meshes), len(bpy.data.actions), len(bpy.data.armatures)]
     document = bpy.context.scene.get("contact_core")
-    return [*state, kept, datablocks, None if document is None else (document["revision"], bytes(document["data"]))]
+    return [*state, kept, datablocks, None if document is None else _property_state(document)]
+
+
+def _property_state(document: Any) -> Any:
+    """The stored document, in which order its parts were put or not."""
+    parts = sorted((key, bytes(text)) for key, text in document["parts"].items())
+    return document["revision"], document["digest"], document["schema"], document["ids"], parts
 
 
 def _bone_state(bone: Any) -> Any:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contact_core.document.schema import VERSION, dump_document, parse_document
+from contact_core.document.schema import dump_document
 from contact_core.errors import CommandRejected, FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.scene.host import SceneSpace, StoredDocument
+from contact_core.scene.host import SceneSpace
 from contact_core.session import Session
 from contact_core.testing import meshes
+from contact_core.testing.host_checks import store, stored
 from contact_core.testing.host_scenes import HostScene, SceneMesh, SceneRig, arm_rig, bent
 
 
@@ -53,7 +54,7 @@ def test_ids_follow_their_objects(bpy: Any, torus: Any, tmp_path: Path) -> None:
     digest = torus.read_surface("torus").mesh.digest
     bpy.data.objects["torus"].name = "ring"
     with torus.step("Document"):
-        torus.store_document(StoredDocument(b"{}", 1, VERSION))
+        store(torus, stored(1, {"a": "{}"}))
     impostor = bpy.data.objects.new("torus", bpy.data.meshes.new("empty"))
     bpy.context.scene.collection.objects.link(impostor)
     assert {(item.id, item.name) for item in torus.objects()} == {
@@ -89,13 +90,45 @@ def test_the_document_is_one_property_of_the_scene(bpy: Any, torus: Any) -> None
     assert set(bpy.context.scene.keys()) - before == {"contact_core"}
 
 
-@pytest.mark.parametrize("damage", [5, {"data": b"{}"}, {"data": 3.5, "revision": 1, "schema": 1}])
-def test_a_damaged_property_is_refused_and_left(bpy: Any, torus: Any, damage: Any) -> None:
+STAMP = {"revision": 1, "digest": "0", "schema": 1}
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (5, "not a contact document"),
+        (STAMP, "not a contact document"),
+        ({"parts": {"a": b"{}"}}, "not a contact document"),
+        ({**STAMP, "parts": b"{}"}, "not a contact document"),
+        ({"revision": 1, "schema": 1, "data": b"{}", "ids": "[]", "objects": {}}, "in one piece"),
+    ],
+)
+def test_a_damaged_property_is_refused_and_left(bpy: Any, torus: Any, damage: Any, words: str) -> None:
     bpy.context.scene["contact_core"] = damage
-    for attempt in (torus.stored_document, lambda: torus.store_document(StoredDocument(b"{}", 1, VERSION))):
-        with pytest.raises(FileRefused, match="not a contact document"):
+    for attempt in (torus.stored_document, torus.stored_stamp, lambda: store(torus, stored(1, {"a": "{}"}))):
+        with pytest.raises(FileRefused, match=words):
             attempt()
     assert "contact_core" in bpy.context.scene
+
+
+@pytest.mark.parametrize("part", [3.5, b"\xff", "text"])
+def test_a_damaged_part_is_refused_and_left(bpy: Any, torus: Any, part: Any) -> None:
+    store(torus, stored(1, {"a": "{}"}))
+    bpy.context.scene["contact_core"]["parts"]["a"] = part
+    with pytest.raises(FileRefused, match="not a contact document"):
+        torus.stored_document()
+
+
+def test_an_edit_writes_the_parts_that_it_changes(bpy: Any, torus: Any) -> None:
+    """Nothing else of the property is touched: what is there for others keeps its place in memory."""
+    session = open_session(torus)
+    names = [paint(session, seed) for seed in (1, 2)]
+    before = torus.stored_document()
+    session.patches.rotate(names[0], 0.3)
+    after = torus.stored_document()
+    changed = {key for key in before.parts if before.parts[key] != after.parts[key]}
+    assert len(changed) == 1 and before.parts.keys() == after.parts.keys()
+    assert f'"{names[0]}"' in after.parts[changed.pop()]
 
 
 def test_nothing_but_ids_keeps_blender_objects(bpy: Any, torus: Any) -> None:
@@ -109,7 +142,7 @@ def test_nothing_but_ids_keeps_blender_objects(bpy: Any, torus: Any) -> None:
     reached = set()
     with pytest.raises(ZeroDivisionError), torus.step("fails"):
         torus.write_pose("arm", bent(rig, 3), 5.0)
-        torus.store_document(StoredDocument(b"{}", 99, VERSION))
+        store(torus, stored(99, {"a": "{}"}))
         reached |= values_reached_from(torus)  # with what would take the step back
         raise ZeroDivisionError
     reached |= values_reached_from(torus)
@@ -142,10 +175,10 @@ def test_in_edit_mode_a_step_waits(bpy: Any, torus: Any) -> None:
     session = open_session(torus)
     bpy.context.view_layer.objects.active = bpy.data.objects["torus"]
     bpy.ops.object.mode_set(mode="EDIT")
-    stored, revision = torus.stored_document(), session.revision
+    held, revision = torus.stored_document(), session.revision
     with pytest.raises(InvalidInput, match="leave Edit Mode"):
         paint(session, 4)
-    assert torus.stored_document() == stored and session.revision == revision
+    assert torus.stored_document() == held and session.revision == revision
     bpy.ops.object.mode_set(mode="OBJECT")
     paint(session, 4)
 
@@ -162,19 +195,19 @@ def test_in_every_mode_a_step_can_be_undone_or_is_refused(bpy: Any, torus: Any, 
     bpy.context.view_layer.objects.active = made.parent if mode == "POSE" else made
     rig = torus.read_rig("arm").rig
     with torus.step("before"):
-        torus.store_document(StoredDocument(b"0", 1, VERSION))
+        store(torus, stored(1, {"at": "0"}))
     bpy.ops.object.mode_set(mode=mode)
     try:
         for number in (1, 2):
             with torus.step("in the mode"):
-                torus.store_document(StoredDocument(str(number).encode(), number + 1, VERSION))
+                store(torus, stored(number + 1, {"at": str(number)}))
                 torus.write_pose("arm", bent(rig, number), float(number))
     except InvalidInput as error:
         assert mode in ("TEXTURE_PAINT", "PARTICLE_EDIT", "EDIT") and "waits until you leave" in str(error)
-        assert torus.stored_document().data == b"0" and torus.pose_keys("arm") == ()
+        assert torus.stored_document().parts == {"at": "0"} and torus.pose_keys("arm") == ()
     else:
         for way, wanted in (("undo", 1), ("undo", 0), ("redo", 1), ("redo", 2)):
-            assert getattr(torus, way)() and torus.stored_document().data == str(wanted).encode()
+            assert getattr(torus, way)() and torus.stored_document().parts == {"at": str(wanted)}
             assert torus.pose_keys("arm") == tuple(map(float, range(1, wanted + 1)))
     bpy.ops.object.mode_set(mode="OBJECT")
 
@@ -235,9 +268,10 @@ def test_a_walk_of_three_hundred_steps(bpy: Any, torus: Any) -> None:
             states[at:] = [(blender_scenes.whole_state(), dump_document(session.document))]
             floor = max(floor, at - 28)  # Blender keeps 32 steps
         done[what] += 1
-        stored = torus.stored_document()
-        assert stored.revision == session.revision == session.history.revision, (step, what)
-        assert stored.data == dump_document(session.document) == states[at][1], (step, what)
+        found = torus.stored_document()
+        assert found.stamp.revision == session.revision == session.history.revision, (step, what)
+        held = dump_document(found.read("the scene").document)
+        assert held == dump_document(session.document) == states[at][1], (step, what)
         assert blender_scenes.whole_state() == states[at][0], (step, what)
     assert min(done.values()) > 20, done
     session.close()
@@ -286,8 +320,8 @@ def test_reopening_goes_on_where_it_was(torus: Any, tmp_path: Path) -> None:
     assert dump_document(again.document) == document and again.revision == revision
     with pytest.raises(CommandRejected, match="nothing to undo"):
         again.undo()
-    stored = again.host.stored_document()
-    assert parse_document(stored.data).patches.keys() == again.document.patches.keys()
+    held = again.host.stored_document().read("the scene").document
+    assert held.patches.keys() == again.document.patches.keys()
 
 
 def test_a_scene_is_saved_as_a_blend_file_only(torus: Any, tmp_path: Path) -> None:

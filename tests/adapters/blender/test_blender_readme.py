@@ -14,4 +14,4 @@ def test_the_script_runs(bpy: Any, empty: Any, repository: Path) -> None:
     exec(compile(script, "README.md", "exec"), names)
     session = names["session"]
     assert list(session.document.patches) == ["grip"]
-    assert names["host"].stored_document().revision == session.revision
+    assert names["host"].stored_stamp().revision == session.revision

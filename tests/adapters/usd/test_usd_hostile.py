@@ -15,14 +15,13 @@ from pxr import Usd
 
 from contact_core.cli import main
 from contact_core.document.asset import Asset
-from contact_core.document.schema import VERSION
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose
-from contact_core.scene.host import SceneSpace, StoredDocument
+from contact_core.scene.host import SceneSpace
 from contact_core.session import Session
 from contact_core.testing import meshes
-from contact_core.testing.host_checks import volume
+from contact_core.testing.host_checks import store, stored, volume
 from contact_usd.host import UsdHost
 
 CORNERS = "point3f[] points = [(0,0,0), (1,0,0), (0,1,0)]\n"
@@ -217,16 +216,14 @@ def test_files_that_are_no_usd_are_refused_in_a_sentence(
     assert codes == [2, 2]
 
 
+STAMP = 'int64 contact:revision = 1\nstring contact:digest = "0"\nint contact:schema = 1\n'
 DOCUMENTS = {
-    "no revision": 'string contact:document = "{}"\n',
+    "no revision": 'string contact:digest = "0"\nint contact:schema = 1\n',
+    "no digest": "int64 contact:revision = 1\nint contact:schema = 1\n",
     "words for numbers": (
-        'string contact:document = "{}"\nstring contact:revision = "x"\nstring contact:schema = "y"\n'
+        'string contact:digest = "0"\nstring contact:revision = "x"\nstring contact:schema = "y"\n'
     ),
-    "a number for the text": "int contact:document = 3\nint64 contact:revision = 1\nint contact:schema = 1\n",
-    "no base64": (
-        'string contact:document = "!!"\ntoken contact:encoding = "base64"\nint64 contact:revision = 1\n'
-        "int contact:schema = 1\n"
-    ),
+    "a number for a part": f"{STAMP}int contact:part:a = 3\n",
 }
 
 
@@ -237,9 +234,9 @@ def test_a_damaged_document_is_refused_and_left(what: str, tmp_path: Path) -> No
         with pytest.raises(FileRefused, match="damaged") as refused:
             host.stored_document()
         assert "NoneType" not in str(refused.value)
-    if "words" in what:
-        with pytest.raises(FileRefused, match="contact:schema is no int"):
-            host.store_document(StoredDocument(b"{}", 1, VERSION))
+    if "part" not in what:
+        with pytest.raises(FileRefused, match=r"contact:(revision|digest) is no"):
+            store(host, stored(1))
     with pytest.raises(FileRefused):
         Session(host=host, discover=False)
     assert host._undo._listeners == []  # the session that could not begin does not listen

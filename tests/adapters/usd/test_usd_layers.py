@@ -16,15 +16,15 @@ import pytest
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from contact_core.document.asset import Asset
-from contact_core.document.schema import VERSION, parse_document, same_documents
+from contact_core.document.schema import same_documents
 from contact_core.errors import FileRefused
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.scene.host import StoredDocument
 from contact_core.session import Session
 from contact_core.testing import meshes
+from contact_core.testing.host_checks import revision_of, store, stored
 from contact_core.testing.host_scenes import arm_rig, bent
 from contact_usd import contacts, schema_dir
 from contact_usd.host import UsdHost
@@ -94,6 +94,68 @@ def test_what_a_layer_below_published_does_not_come_back(tmp_path: Path) -> None
     contacts.publish(host, session, {"torus": key})
     assert {patch.name for patch in contacts.read_patches(host.stage)} == names
     assert len(contacts.read_pairs(host.stage)) == 1
+
+
+def test_publishing_writes_what_changed_and_nothing_else() -> None:
+    """Prims whose patch, surface, pose and place are the same are not touched; those of other names go."""
+    host, session, key = torus_host()
+    contacts.publish(host, session, {"torus": key})
+    whole, changed = host.layer.ExportToString(), set[str]()
+
+    def hear(notice: Usd.Notice.ObjectsChanged, stage: Usd.Stage) -> None:
+        paths = [*notice.GetResyncedPaths(), *notice.GetChangedInfoOnlyPaths()]
+        changed.update(path.GetPrimPath().name for path in paths)
+
+    listener = Tf.Notice.Register(Usd.Notice.ObjectsChanged, hear, host.stage)
+    contacts.publish(host, session, {"torus": key})
+    assert host.layer.ExportToString() == whole and not changed
+    copy = next(name for name in session.document.patches if name != "grip (links)")
+    session.patches.rotate(copy, 0.3)
+    assert changed == {"Contacts"}  # the document alone
+    changed.clear()
+    contacts.publish(host, session, {"torus": key})
+    prim = Tf.MakeValidIdentifier(copy)
+    assert changed == {prim, f"{prim}_axis"}
+    found = {patch.name: patch for patch in contacts.read_patches(host.stage)}
+    there = session.geometry.reconstruction(copy).points.positions(session.surfaces.meshes["torus"])
+    np.testing.assert_allclose(found[copy].positions, there, atol=1e-6)
+    host.undo(), host.undo()
+    assert host.layer.ExportToString() == whole
+    session.patches.rename(copy, "other")
+    changed.clear()
+    contacts.publish(host, session, {"torus": key})
+    assert {patch.name for patch in contacts.read_patches(host.stage)} == {"grip (links)", "other"}
+    assert {prim, "other"} <= changed and Tf.MakeValidIdentifier("grip (links)") not in changed
+    listener.Revoke()
+
+
+def test_a_document_of_a_layer_below_does_not_mix_with_ours(tmp_path: Path) -> None:
+    """Our layer holds the whole document from its first edit on, and parts of the one below never come through."""
+    below, session, _ = torus_host()
+    session.close()
+    below.layer.customLayerData = {}
+    below.save(tmp_path / "below.usda")
+    host = UsdHost(tmp_path / "below.usda")
+    with Session(host=host, discover=False) as above:
+        above.remove("grip (links)")
+        wanted = above.document
+    host.save(tmp_path / "above.usda")
+    with Session(host=below, discover=False) as session:  # the file below goes on
+        session.set_extra("note", "later")
+    below.save(tmp_path / "below.usda")
+    with Session(host=UsdHost(tmp_path / "above.usda"), discover=False) as again:
+        assert same_documents(again.document, wanted)
+
+
+def test_a_document_in_one_piece_is_refused_and_left(tmp_path: Path) -> None:
+    host = UsdHost()
+    prim = host.stage.DefinePrim("/Contacts", "Scope")
+    prim.CreateAttribute("contact:document", Sdf.ValueTypeNames.String).Set("{}")
+    before = host.layer.ExportToString()
+    for attempt in (host.stored_document, host.stored_stamp, lambda: store(host, stored(1))):
+        with pytest.raises(FileRefused, match="in one piece"):
+            attempt()
+    assert host.layer.ExportToString() == before
 
 
 def test_usds_own_validators_find_no_error_in_our_layer(tmp_path: Path) -> None:
@@ -178,7 +240,7 @@ def test_sources_are_never_written(tmp_path: Path) -> None:
     made.save(source)
     before = hashlib.sha256(source.read_bytes()).hexdigest()
     host = UsdHost(source)
-    host.store_document(StoredDocument(b"{}", 1, VERSION))
+    store(host, stored(1, {"a": "{}"}))
     with pytest.raises(FileRefused, match="never written"):
         host.save(source)
     host.save()
@@ -227,7 +289,7 @@ def test_a_stage_that_a_dcc_has_open_keeps_its_layers(tmp_path: Path) -> None:
     stage = Usd.Stage.Open(str(tmp_path / "scene.usda"))
     root, session_layer = stage.GetRootLayer().ExportToString(), stage.GetSessionLayer()
     host = UsdHost.on(stage)
-    host.store_document(StoredDocument(b"{}", 4, VERSION))
+    store(host, stored(4, {"a": "{}"}))
     assert stage.GetPrimAtPath("/Contacts").GetAttribute("contact:revision").Get() == 4
     assert stage.GetRootLayer().ExportToString() == root and not stage.GetRootLayer().dirty
     assert not session_layer.rootPrims
@@ -239,18 +301,17 @@ def test_every_host_on_one_stage_has_its_one_document() -> None:
     stage = Usd.Stage.CreateInMemory()
     for revision in (1, 2, 3):
         host = UsdHost.on(stage)
-        stored = host.stored_document()
-        assert (0 if stored is None else stored.revision) == revision - 1
-        host.store_document(StoredDocument(b"{}", revision, VERSION))
+        assert (revision_of(host) or 0) == revision - 1
+        store(host, stored(revision, {"a": "{}"}))
         assert stage.GetPrimAtPath("/Contacts").GetAttribute("contact:revision").Get() == revision
         assert host.undo() and host.redo() and not host.redo()
         del host
     assert len(stage.GetSessionLayer().subLayerPaths) == 1
     one, other = UsdHost.on(stage), UsdHost.on(stage)
-    one.store_document(StoredDocument(b"{}", 4, VERSION))
-    other.store_document(StoredDocument(b"{}", 5, VERSION))
-    assert one.stored_document() == other.stored_document() == StoredDocument(b"{}", 5, VERSION)
-    assert other.undo() and one.stored_document().revision == 4  # type: ignore[union-attr]
+    store(one, stored(4, {"a": "{}"}))
+    store(other, stored(5, {"b": "{}"}))
+    assert one.stored_document() == other.stored_document() == stored(5, {"b": "{}"})
+    assert other.undo() and revision_of(one) == 4
 
 
 def test_three_hundred_steps_of_core_host_and_strangers_agree() -> None:
@@ -282,7 +343,7 @@ def test_three_hundred_steps_of_core_host_and_strangers_agree() -> None:
             at += not what == last == "stranger"  # what strangers do in a row is one step
             texts[at:] = [host.layer.ExportToString()]
         last = what
-        stored = host.stored_document()
-        assert stored is not None and stored.revision == session.revision, (number, what)
-        assert same_documents(parse_document(stored.data), session.document), (number, what)
+        found = host.stored_document()
+        assert found is not None and found.stamp.revision == session.revision, (number, what)
+        assert same_documents(found.read("the stage").document, session.document), (number, what)
         assert host.layer.ExportToString() == texts[at], (number, what)

@@ -18,8 +18,8 @@ def test_the_script_runs(repository: Path, tmp_path: Path, monkeypatch: pytest.M
     text = (repository / "adapters" / "usd" / "README.md").read_text(encoding="utf-8")
     (script,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     exec(compile(script, "README.md", "exec"), {})
-    stored = UsdHost(tmp_path / "ring.contact.usda").stored_document()
-    assert stored is not None and stored.revision == 2  # surface, patch; the turn was undone
+    stamp = UsdHost(tmp_path / "ring.contact.usda").stored_stamp()
+    assert stamp is not None and stamp.revision == 2  # surface, patch; the turn was undone
 
 
 @pytest.mark.parametrize("action", ["inspect", "export", "transfer", "solve"])

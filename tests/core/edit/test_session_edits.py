@@ -122,8 +122,8 @@ def test_a_host_asked_to_undo_during_a_drag_is_not_asked() -> None:
         for act in (session.undo, session.redo):
             with pytest.raises(CommandRejected, match="stroke is under way"):
                 act()
-    stored = host.stored_document()
-    assert stored is not None and stored.revision == session.revision and extras(session) == {"a": 1, "drag": 1}
+    stamp = host.stored_stamp()
+    assert stamp is not None and stamp.revision == session.revision and extras(session) == {"a": 1, "drag": 1}
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["a revision of the history", "a document unknown"])
@@ -162,8 +162,8 @@ def test_where_the_host_went_the_session_goes_though_the_journal_cannot(
     session._file._journal._broken = "the disk is full."  # type: ignore[union-attr]
     with pytest.raises(FileRefused, match="disk is full"):
         session.set_extra("b", 1)
-    stored = host.stored_document()
-    assert stored is not None and stored.revision == session.revision == 1
+    stamp = host.stored_stamp()
+    assert stamp is not None and stamp.revision == session.revision == 1
     told: list[str] = []
     session.listen(lambda change: told.append(change.kind))
     session.undo()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from contact_core.document.asset import Asset
-from contact_core.document.schema import parse_document, same_documents
+from contact_core.document.schema import same_documents
 from contact_core.edit.commands.organising import Recolor
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.polar import split_world_from_local
@@ -65,8 +65,8 @@ def test_three_hundred_steps_of_core_host_and_user_agree() -> None:
             at += 1
             scenes[at:] = [host.scene]
         stored = host.stored_document()
-        assert stored is not None and stored.revision == session.revision, (number, what)
-        assert same_documents(parse_document(stored.data), session.document), (number, what)
+        assert stored is not None and stored.stamp.revision == session.revision, (number, what)
+        assert same_documents(stored.read("the scene").document, session.document), (number, what)
         assert host.scene is scenes[at], (number, what)
 
 
