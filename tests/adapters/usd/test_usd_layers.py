@@ -137,7 +137,7 @@ def test_a_document_of_a_layer_below_does_not_mix_with_ours(tmp_path: Path) -> N
     below.save(tmp_path / "below.usda")
     host = UsdHost(tmp_path / "below.usda")
     with Session(host=host, discover=False) as above:
-        above.remove("grip (links)")
+        above.patches.remove("grip (links)")
         wanted = above.document
     host.save(tmp_path / "above.usda")
     with Session(host=below, discover=False) as session:  # the file below goes on
