@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from typing import Any
 
 from contact_core.arrays import digest
@@ -40,7 +41,8 @@ def _near(track: Track, low: float, high: float) -> list[Any]:
     """The keys between two frames, and the next one on either side, which say how it goes there; of poses, those
     that a person made."""
     if isinstance(track.keys[0], PoseKey):
-        return [key for key in track.of(PoseKey) if key.is_authored and low <= key.frame <= high]
+        pins = (key for key in track.of(PoseKey) if key.is_authored and low <= key.frame <= high)
+        return [replace(key, speeds=None) for key in pins]
     keys = track.keys
     before = [key for key in keys if key.frame < low][-1:]
     after = [key for key in keys if key.frame > high][:1]

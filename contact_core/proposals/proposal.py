@@ -5,7 +5,7 @@ None is ever silent: each returns a `Proposal`, a ghost that a person looks at a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,12 +23,11 @@ from contact_core.proposals.draft import Draft, change
 from contact_core.proposals.sliding import solve_sliding
 from contact_core.proposals.sliding_targets import SlidingPatch
 from contact_core.rig.rig import Pose
-from contact_core.scene.problem import Objective, poses_of, world_from_surface
+from contact_core.scene.problem import Objective, world_from_surface
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import Solids
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.sequence import solve_sequence
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 
 if TYPE_CHECKING:
@@ -99,43 +98,6 @@ def solve(
     draft.take(solution)
     command = change(start, draft.document, "Solve")
     return Proposal(command, draft.document, revision, solution, solution, solutions=(solution,))
-
-
-def solve_frames(
-    start: ContactDocument,
-    drafts: Iterable[tuple[float, Draft]],
-    count: int,
-    plugins: PluginManager,
-    revision: int,
-    settings: SolveSettings,
-) -> Proposal:
-    """The poses at rising frames, each from the one before. drafts: `count` of them, the document
-    as the scene has it at each frame.
-
-    Raises Cancelled where not one frame was solved.
-    """
-    last: list[Draft] = []
-
-    def problems() -> Iterable[tuple[float, PoseProblem]]:
-        for frame, draft in drafts:
-            last[:] = [draft]
-            yield frame, _problem(draft, settings, "solving")
-
-    solved = solve_sequence(
-        settings.solver_of(plugins),
-        problems(),
-        prior="problem",
-        options=settings.options,
-        progress=settings.progress,
-        count=count,
-    )
-    if not solved.solutions:
-        raise Cancelled("it was cancelled before the first frame was solved; nothing is proposed.")
-    draft, after = last[0], solved.solutions[-1]
-    draft.take(after)
-    keys = {f: poses_of(s, draft.rigs) for f, s in zip(solved.frames, solved.solutions, strict=True)}
-    command = change(start, draft.document, "Solve and key")
-    return Proposal(command, draft.document, revision, after, after, keys=keys, solutions=solved.solutions)
 
 
 def settle(

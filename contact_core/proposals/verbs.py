@@ -14,8 +14,10 @@ from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 
 if TYPE_CHECKING:
     from contact_core.edit.command import Command
+    from contact_core.edit.verbs import Film
     from contact_core.plugins.manager import PluginManager
     from contact_core.proposals.draft import Draft
+    from contact_core.proposals.motion import MotionSettings
     from contact_core.proposals.proposal import Proposal, SolveSettings
     from contact_core.rig.rig import Pose, Rig
     from contact_core.scene.binding import Binding
@@ -29,6 +31,12 @@ class ProposingSession(ABC):
     """Solve, settle, slide, accept, dismiss. rigs: by surface."""
 
     rigs: dict[str, Rig]
+    timeline: Film
+
+    @property
+    @abstractmethod
+    def timed_document(self) -> ContactDocument:
+        """The document with its tracks and spans, of which `document` is a frame."""
 
     @property
     @abstractmethod
@@ -85,10 +93,13 @@ class ProposingSession(ABC):
         options: SolveOptions | None = None,
         progress: Progress = NO_PROGRESS,
         settings: SolveSettings | None = None,
+        motion: MotionSettings | None = None,
     ) -> Proposal:
         """Propose the pose that brings all pairs together, from where things stand in the scene now.
 
-        frames: solve and, when accepted, key at these frames, rising; None is the scene as it stands, not keyed.
+        frames: solve a motion through all these frames at once, and key it when it is accepted (a MotionProposal);
+        None is the scene as it stands, not keyed. `timeline.window()` are the frames round a key that was dragged.
+        motion: how frames hang together, and how near few keys come to them.
         solver: a name; None leaves the choice to the plugins. solver_settings: its own.
         terms: terms, or names of registered ones that are added to the paper's three; the paper's by default.
         free, held: joints or single dofs by surface that may move, and that may not. prior: what the prior pulls
@@ -97,7 +108,8 @@ class ProposingSession(ABC):
         `accept` does that. Where it is cancelled, what was best so far is proposed, with the
         status CANCELLED. Raises InvalidInput without a pair of a rig that can be posed.
         """
-        from contact_core.proposals.proposal import SolveSettings, solve, solve_frames
+        from contact_core.proposals.motion import MotionSettings, propose_motion
+        from contact_core.proposals.proposal import SolveSettings, solve
         from contact_core.scene.problem import Objective
 
         if settings is None:
@@ -108,8 +120,10 @@ class ProposingSession(ABC):
         if frames is None:
             found = solve(self.document, self._draft(), self.plugins, self.revision, settings)
         else:
-            drafts = ((float(frame), self._draft(float(frame))) for frame in frames)
-            found = solve_frames(self.document, drafts, len(frames), self.plugins, self.revision, settings)
+            found = propose_motion(
+                self.timed_document, self.timeline.frame, frames, self._draft, self.plugins, self.revision,
+                settings, motion or MotionSettings(),
+            )  # fmt: skip
         self.show_ghost(found)
         return found
 
@@ -170,7 +184,8 @@ class ProposingSession(ABC):
         """The document as the scene has it at a frame, to work on."""
         from contact_core.proposals.draft import Draft
 
-        document = self.binding.read(self.document, frame)
+        still = self.document if frame is None else self.timed_document.at(frame)
+        document = self.binding.read(still, frame)
         posed = {
             document.patch(end).surface
             for pair in document.pairs.values()

@@ -132,6 +132,13 @@ class Film:
         self._frame = float(frame)
         self._editor.frame_changed(before)
 
+    def window(self, frame: float | None = None, seconds: float = 2.0) -> tuple[float, ...]:
+        """The frames round one, by default that which is shown, within the range: what a key that was dragged there
+        changes, as `solve(frames=...)` takes them."""
+        at = self.frame if frame is None else float(frame)
+        reach = 0.5 * seconds * self.settings.frames_per_second
+        return tuple(each for each in self.settings.frames() if at - reach <= each <= at + reach)
+
     def set(
         self,
         first: float | None = None,

@@ -1,0 +1,328 @@
+"""Proposing a motion: the document at every frame as one motion problem, solved as a whole, reduced to few keys.
+
+What is keyed already round a range stays: two frames on either side are pinned to what the keys there say, so that
+the film runs on with its speed. Keys that a person made within it are pins, and solved ones give way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.contact.pairing import correspond
+from contact_core.contact.tracer import ShapedPatch
+from contact_core.document.document import ContactDocument
+from contact_core.document.staleness import motion_source
+from contact_core.document.timeline import PoseKey, address
+from contact_core.edit.command import Command, Macro, apply_command
+from contact_core.edit.commands import SetKeys
+from contact_core.errors import Cancelled, InvalidInput
+from contact_core.motion.placement_keys import PlacementKey, PlacementKeys
+from contact_core.motion.problem import MotionBounds, MotionProblem, MotionWeights
+from contact_core.motion.reduction import MILLIMETRE, Reduction, reduce_poses
+from contact_core.motion.report import MotionReport, motion_report
+from contact_core.motion.sliding import SlidingPatch
+from contact_core.motion.solving import MotionOptions, MotionSolution, solve_motion
+from contact_core.progress import Progress
+from contact_core.proposals.draft import Draft
+from contact_core.proposals.proposal import Proposal, SolveSettings
+from contact_core.rig.pose_keys import PoseKeys
+from contact_core.rig.rig import Pose, Rig
+from contact_core.scene.evaluated_rig import EvaluatedRig
+from contact_core.solve.body import PairedPoints
+from contact_core.solve.penetration import Solids
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolution, SolveStatus
+
+if TYPE_CHECKING:
+    from contact_core.plugins.manager import PluginManager
+
+PINNED = 2  # frames on either side of a range that run on as they are keyed
+
+
+@dataclass(frozen=True)
+class MotionSettings:
+    """How frames are solved together, and how their poses become keys.
+
+    weights, bounds, options: of the joint solve; with a weight `follow` the poses that are keyed now are followed,
+    which keeps the style of a clip that is repaired. tolerance: metres that any point of the skin may be off with
+    the keys.
+    """
+
+    weights: MotionWeights = field(default_factory=MotionWeights)
+    bounds: MotionBounds = field(default_factory=MotionBounds)
+    options: MotionOptions = field(default_factory=MotionOptions)
+    tolerance: float = MILLIMETRE
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < np.inf:
+            raise InvalidInput(f"the tolerance of keys is a positive number of metres, but {self.tolerance} came.")
+
+
+@dataclass(frozen=True, eq=False)
+class MotionProposal(Proposal):
+    """A motion that is not yet committed. motion: all frames as solved. reductions: by surface, the keys that the
+    document gets (cubic); `keys` are those of the scene, which are joined by straight blends."""
+
+    motion: MotionSolution | None = None
+    reductions: Mapping[str, Reduction] = field(default_factory=dict)
+
+    def report(self, *, depth: bool = True) -> MotionReport:
+        """What it is worth, in figures. depth: whether penetration is measured, too."""
+        assert self.motion is not None
+        solids: Solids | None = None if depth else {}
+        return motion_report(self.motion.motion, self.motion.thetas, solids=solids, reductions=self.reductions)
+
+
+def propose_motion(
+    timed: ContactDocument,
+    frame: float,
+    frames: Sequence[float],
+    draft_at: Callable[[float], Draft],
+    plugins: PluginManager,
+    revision: int,
+    settings: SolveSettings,
+    motion: MotionSettings,
+) -> MotionProposal:
+    """The motion through frames. timed: the document with its tracks. frame: which one a ghost shows. draft_at: the
+    document at a frame, as the scene has it there.
+
+    Raises InvalidInput without a pair of a rig that can be posed, Cancelled where nothing was solved.
+    """
+    return _Motion(timed, frames, draft_at, plugins, settings, motion).proposal(frame, revision)
+
+
+class _Motion:
+    """One motion while it is made."""
+
+    def __init__(
+        self,
+        timed: ContactDocument,
+        frames: Sequence[float],
+        draft_at: Callable[[float], Draft],
+        plugins: PluginManager,
+        settings: SolveSettings,
+        motion: MotionSettings,
+    ) -> None:
+        self.timed, self.draft_at, self.plugins = timed, draft_at, plugins
+        self.settings, self.motion = settings, motion
+        self.rate = timed.timeline.frames_per_second
+        asked = sorted({float(frame) for frame in frames})
+        if not asked or not np.isfinite(asked).all() or len(asked) != len(list(frames)):
+            raise InvalidInput(
+                f"frames to solve are numbers, each once, at least one, but {list(frames)[:6]} came."
+            )
+        self.before, self.after = self._pinned_beside(asked)
+        authored = {f for track in self._tracks().values() for f in _authored(track) if asked[0] < f < asked[-1]}
+        self.frames = tuple(sorted({*asked, *self.before, *self.after, *authored}))
+
+    def proposal(self, frame: float, revision: int) -> MotionProposal:
+        """Solve, reduce, and say what accepting does."""
+        progress = self.settings.progress
+        problem = self._problem(progress.part(0.0, 0.2))
+        start = self._start(problem)
+        solver = self.settings.solver_of(self.plugins)
+        solution = solve_motion(
+            problem, solver=solver, options=self.motion.options, start=start, progress=progress.part(0.2, 0.9)
+        )
+        if solution.status is SolveStatus.CANCELLED and not solution.evaluations:
+            raise Cancelled("it was cancelled before the first frame was solved; nothing is proposed.")
+        poses = {name: self._poses(solution, name) for name in self.posed}
+        cubic = {name: self._reduced(name, poses[name], "cubic") for name in self.posed}
+        linear = {name: self._reduced(name, poses[name], "linear") for name in self.posed}
+        command = self._command({name: done.keys for name, done in cubic.items()})
+        by_frame = _solutions(solution)
+        return MotionProposal(
+            command=command,
+            ghost=apply_command(command, self.timed).at(frame),
+            revision=revision,
+            before=by_frame[-1],
+            after=by_frame[-1],
+            keys=_by_frame({name: done.keys for name, done in linear.items()}),
+            solutions=tuple(by_frame[row] for row, f in enumerate(self.frames) if self._is_asked(f)),
+            motion=solution,
+            reductions=cubic,
+        )
+
+    # --- the problem ----------------------------------------------------------------------------------------
+
+    def _problem(self, progress: Progress) -> MotionProblem:
+        problems, drafts = [], []
+        for row, frame in enumerate(self.frames):
+            progress.tell(row / len(self.frames), f"frame {frame:g}")
+            drafts.append(self.draft_at(frame))
+            problems.append(self._problem_at(drafts[-1], frame))
+        self.rigs: dict[str, Rig] = drafts[0].rigs
+        bodies, free = problems[0].bodies, problems[0].free_of_body
+        self.posed = [b.name for b, dofs in zip(bodies, free, strict=True) if b.name in self.rigs and len(dofs)]
+        if not self.posed:
+            raise InvalidInput("solving needs contact pairs with a rig that can be posed: pair patches first.")
+        reference = None
+        if self.motion.weights.follow > 0.0:
+            reference = {name: tuple(_pose_in(problem, name) for problem in problems) for name in self.posed}
+        return MotionProblem(
+            self.frames, tuple(problems), self.rate, self.motion.weights, self.motion.bounds,
+            self._pins(), reference,
+        )  # fmt: skip
+
+    def _problem_at(self, draft: Draft, frame: float) -> PoseProblem:
+        if not draft.document.pairs:
+            raise InvalidInput("solving needs contact pairs with a rig that can be posed: pair patches first.")
+        problem = draft.problem(self.settings.objective)
+        return replace(problem, contacts=tuple(self._calmed(draft, c.name, c, frame) for c in problem.contacts))
+
+    def _calmed(self, draft: Draft, pair: str, contact: PairedPoints, frame: float) -> PairedPoints:
+        """A contact whose patches slide by keys, with their points smoothed over time."""
+        ends = self.timed.pairs[pair]
+        changes: dict[str, Any] = {}
+        for side, patch, order in (
+            ("manipulator_points", ends.manipulator, None),
+            ("object_points", ends.object, self._order(pair)),
+        ):
+            sliding = self._sliding(draft, patch)
+            if sliding is not None:
+                points = sliding.points(frame)
+                changes[side] = points if order is None else points[order]
+        return replace(contact, **changes) if changes else contact
+
+    def _order(self, pair: str) -> IntArray | None:
+        """Which point of the object's patch belongs to each of the manipulator's, None for the same ones."""
+        shapes = [
+            self.timed.patch(end).shape
+            for end in (self.timed.pairs[pair].manipulator, self.timed.pairs[pair].object)
+        ]
+        return None if shapes[0] == shapes[1] else correspond(*(self.timed.shapes[key] for key in shapes))
+
+    def _sliding(self, draft: Draft, name: str) -> SlidingPatch | None:
+        """A patch that has placement keys, smooth over time; made once."""
+        track = self.timed.tracks.get(address("placement", name))
+        if track is None:
+            return None
+        kept = self.__dict__.setdefault("_slides", {})
+        if name not in kept:
+            document, patch = self.timed, self.timed.patch(name)
+            shaped = ShapedPatch(
+                document.shapes[patch.shape],
+                document.effective_axis(name),
+                patch.mirrored,
+                draft.derived.unit(document, name),
+            )
+            mesh = draft.derived.mesh(document, patch.surface)
+            kept[name] = SlidingPatch(mesh, shaped, PlacementKeys(track.of(PlacementKey)))
+        found: SlidingPatch = kept[name]
+        return found
+
+    # --- what is keyed already ------------------------------------------------------------------------------
+
+    def _tracks(self) -> dict[str, tuple[PoseKey, ...]]:
+        """By surface, the pose keys that the document has."""
+        tracks = self.timed.tracks
+        names = (name for name in self.timed.surfaces if address("pose", name) in tracks)
+        return {name: tracks[address("pose", name)].of(PoseKey) for name in names}
+
+    def _pinned_beside(self, asked: list[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Frames before and after a range that keys go over."""
+        keyed = [key.frame for keys in self._tracks().values() for key in keys]
+        before = [asked[0] - k for k in range(1, PINNED + 1)] if any(f < asked[0] for f in keyed) else []
+        after = [asked[-1] + k for k in range(1, PINNED + 1)] if any(f > asked[-1] for f in keyed) else []
+        return tuple(before), tuple(after)
+
+    def _pins(self) -> dict[float, dict[str, Pose]]:
+        pins: dict[float, dict[str, Pose]] = {}
+        for name in self.posed:
+            keys = self._tracks().get(name, ())
+            pinned = {key.frame for key in keys if key.is_authored} | {*self.before, *self.after}
+            for frame in pinned & set(self.frames) if keys else ():
+                track = self.timed.tracks[address("pose", name)]
+                pins.setdefault(frame, {})[name] = track.pose_at(frame)
+        return pins
+
+    def _start(self, problem: MotionProblem) -> FloatArray | None:
+        """(n, d) the motion as it is keyed, where keys go over the whole range: a key was dragged."""
+        if not all(self._is_covered(name) for name in self.posed):
+            return None
+        rows = []
+        for frame, posed in zip(self.frames, problem.posed, strict=True):
+            poses = {n: self.timed.tracks[address("pose", n)].pose_at(frame) for n in self.posed}
+            rows.append(posed.theta_of(poses))
+        return np.array(rows)
+
+    def _is_covered(self, name: str) -> bool:
+        keys = self._tracks().get(name, ())
+        solved = [key.frame for key in keys if not key.is_authored]
+        return bool(solved) and solved[0] <= self.frames[0] and self.frames[-1] <= solved[-1]
+
+    def _is_asked(self, frame: float) -> bool:
+        return frame not in self.before and frame not in self.after
+
+    # --- keys -----------------------------------------------------------------------------------------------
+
+    def _poses(self, solution: MotionSolution, name: str) -> tuple[Pose, ...]:
+        poses = []
+        for problem, pose in zip(solution.motion.problems, solution.poses(name), strict=True):
+            box = problem.bodies[problem.body_index(name)].black_box
+            poses.append(box.pose(pose) if isinstance(box, EvaluatedRig) else pose)
+        return tuple(poses)
+
+    def _reduced(self, name: str, poses: tuple[Pose, ...], kind: str) -> Reduction:
+        rig = self.rigs[name]
+        keep = [key.frame for key in self._tracks().get(name, ()) if key.is_authored and key.frame in self.frames]
+        return reduce_poses(
+            rig, self.frames, poses, tolerance=self.motion.tolerance / rig.meters_per_unit,
+            interpolation="cubic" if kind == "cubic" else "linear", keep=keep,
+        )  # fmt: skip
+
+    def _command(self, keys: Mapping[str, PoseKeys]) -> Command:
+        """The keys of all rigs: solved ones in the range give way, those of a person stay what they are."""
+        commands: list[Command] = []
+        for name, found in keys.items():
+            known = {key.frame: key for key in self._tracks().get(name, ())}
+            put = []
+            for row, (frame, pose) in enumerate(zip(found.frames, found.poses, strict=True)):
+                old, speeds = known.get(frame), found.speeds[row] if found.is_cubic else None
+                if old is not None and old.is_authored:
+                    put.append(replace(old, speeds=speeds))
+                else:
+                    put.append(PoseKey(frame, pose, speeds, "smooth", motion_source(self.timed, frame)))
+            low, high = self.frames[0], self.frames[-1]
+            gone = tuple(f for f, key in known.items() if low <= f <= high and not key.is_authored)
+            commands.append(SetKeys(address("pose", name), tuple(put), gone, "Solve"))
+        return commands[0] if len(commands) == 1 else Macro("Solve the motion", tuple(commands))
+
+
+def _authored(keys: Sequence[PoseKey]) -> list[float]:
+    return [key.frame for key in keys if key.is_authored]
+
+
+def _pose_in(problem: PoseProblem, name: str) -> Pose:
+    return problem.bodies[problem.body_index(name)].pose
+
+
+def _by_frame(keys: Mapping[str, PoseKeys]) -> dict[float, dict[str, Pose]]:
+    result: dict[float, dict[str, Pose]] = {}
+    for name, found in keys.items():
+        for frame, pose in zip(found.frames, found.poses, strict=True):
+            result.setdefault(frame, {})[name] = pose
+    return dict(sorted(result.items()))
+
+
+def _solutions(solution: MotionSolution) -> list[PoseSolution]:
+    """Each frame as the solution of a pose problem."""
+    return [
+        PoseSolution(
+            solver="motion",
+            status=solution.status,
+            problem=problem,
+            theta=theta,
+            value=problem.value(problem.state(theta)),
+            start_value=problem.value(problem.start_state),
+            trace=solution.trace,
+            evaluations=solution.evaluations,
+            seconds=solution.seconds,
+        )
+        for problem, theta in zip(solution.motion.posed, solution.thetas, strict=True)
+    ]
