@@ -32,6 +32,7 @@ from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import Limits, PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, patch_residuals, posed_mesh
 from contact_core.solve.terms import DistanceTerm, PriorTerm, paper_terms
+from contact_gallery.thinned import PAPER_WEIGHTS, thinned_to
 from contact_viewer.renderer import PyVistaRenderer
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -47,8 +48,6 @@ WITHOUT: dict[str, tuple[tuple[float, float, float], Limits]] = {
     "no limits": ((1.0, 1.0, 10.0), "none"),
     "no limits, no prior": ((1.0, 1.0, 0.0), "none"),
 }
-PAPER_WEIGHTS = {"point": (3.5, 6.1, 10.0), "curve": (1.0, 1.2, 10.0), "area": (1.0, 1.0, 10.0)}
-CURVE_POINTS = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,25 +113,6 @@ def ablation(name: str, problem: PoseProblem, solver: PoseSolver) -> tuple[list[
         results.append(judged(problem, solved))
         rows.append(results[-1].row(label))
     return [*rows, ""], results
-
-
-def thinned_to(problem: PoseProblem, kind: str, palm_angle: float = 0.0) -> PoseProblem:
-    """The same contacts as single points, or as curves: the pairs nearest to a line through each patch."""
-    if kind == "area":
-        return problem
-    contacts = []
-    for contact in problem.contacts:
-        surface = problem.bodies[problem.body_index(contact.manipulator)].rig.surface
-        offset = contact.manipulator_points.positions(surface)
-        offset = offset - offset.mean(axis=0)
-        u, v = np.linalg.svd(offset, full_matrices=False)[2][:2]
-        turn = np.radians(palm_angle) if contact.name.startswith("palm") else 0.0
-        across = offset @ (np.cos(turn) * v - np.sin(turn) * u)
-        order = np.argsort(np.abs(across)) if kind == "curve" else np.argsort(np.linalg.norm(offset, axis=1))
-        keep = np.sort(order[: CURVE_POINTS if kind == "curve" else 1])
-        ends = contact.manipulator_points[keep], contact.object_points[keep]
-        contacts.append(PairedPoints(contact.name, contact.manipulator, ends[0], contact.object, ends[1]))
-    return replace(problem, contacts=tuple(contacts))
 
 
 def kinds(name: str, problem: PoseProblem) -> list[str]:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 HEAD = """# Gallery
 
-Every figure of the paper ("Contact Edit", TOG 2023), made again by a script of twenty to seventy lines through the
+Every figure of the paper ("Contact Edit", TOG 2023), made again by a short script through the
 public interface, on assets that come with the package, and measured. `contact gallery --all --out DIR` makes this
 page; `contact gallery NAME --out DIR` makes one figure. Seconds are those of the script on one core, reading,
 painting, transferring and solving included, drawing left out. Operations are what an artist has to do: strokes,

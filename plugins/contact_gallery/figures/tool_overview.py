@@ -21,14 +21,25 @@ def draw(sheet: Sheet) -> None:
         rig, mug = session.rigs["hand"], Locator.of(session.geometry.mesh("mug"))
         joints = [rig.joint_index(f"index_{part}") for part in ("proximal", "intermediate", "distal")]
         along = rig.rest_world[joints, :3, 3] + [0.0, 0.0, 0.012]  # over the palm side of the finger
+        fingers = np.concatenate([along + np.array([-0.04, -0.02, 0.0]), along + np.array([0.02, 0.025, 0.0])])
         pictures, seconds = [], {}
 
         def did(name: str, caption: str, surface: str, began: float) -> None:
             seconds[name] = 1000.0 * (time.perf_counter() - began)
-            side, where = ((0.35, 0.1, 1.0), 1.6) if surface == "hand" else ((0.3, 0.35, 1.0), 1.0)
+            side = (0.35, 0.1, 1.0) if surface == "hand" else (0.3, 0.35, 1.0)
             shown = ["finger"] if surface == "hand" else [n for n in session.document.patches if n != "finger"]
-            focus = session.geometry.mesh(surface).points if where == 1.0 else None
-            pictures.append(view(session, surface, patches=shown, camera_from=side, caption=caption, focus=focus))
+            near = fingers if surface == "hand" else session.geometry.mesh(surface).points
+            pictures.append(
+                view(
+                    session,
+                    surface,
+                    patches=shown,
+                    camera_from=side,
+                    caption=caption,
+                    focus=near,
+                    axes=name != "paint",
+                )
+            )
 
         with sheet.counting(session):
             now = time.perf_counter()
@@ -49,7 +60,7 @@ def draw(sheet: Sheet) -> None:
             session.patches.rotate(on_mug, np.radians(-40.0))
             did("rotate", "(e) rotate", "mug", now)
             now = time.perf_counter()
-            session.patches.bend(on_mug, len(session.geometry.axis(on_mug)) // 2, np.radians(60.0))
+            session.patches.bend(on_mug, len(session.geometry.axis(on_mug)) // 2, np.radians(45.0))
             did("bend", "(f) bend", "mug", now)
         sheet.show(*pictures[:3])
         sheet.show(*pictures[3:])

@@ -1,0 +1,74 @@
+"""Three pitches: knuckleball, two-seam fastball, curveball.
+
+Four pads on the hand, four on the ball, painted once. From one pitch to the next only contacts on the ball move,
+two translations and a rotation first, then three translations, and the pose is solved again from where it is.
+"""
+
+import time
+
+import numpy as np
+
+import contact_core as contact
+from contact_core.geometry.raycast import Locator
+from contact_core.rig.poses import set_angles
+from contact_core.scene.picture import Picture
+from contact_gallery.looks import deepest, paint_pad, view
+from contact_gallery.sheet import Sheet
+
+PAPER = "Figure 9"
+PADS = {  # pad: how far along the last bone, and where on the ball it starts: to the thumb, up, to the fingers
+    "thumb_distal": (0.4, (0.25, -0.95, 0.2)),
+    "index_distal": (0.75, (0.32, 0.85, -0.15)),
+    "middle_distal": (0.75, (-0.2, 0.9, -0.15)),
+    "ring_distal": (0.4, (-0.9, -0.25, 0.35)),
+}
+AHEAD = (0.0, 0.0, 1.0)  # the way the fingers point
+
+
+def draw(sheet: Sheet) -> None:
+    with contact.new(hand="sample:human_hand", ball="sample:baseball", plugins=sheet.plugins) as session:
+        rig, ball = session.rigs["hand"], Locator.of(session.geometry.mesh("ball"))
+        degrees = {f"{finger}_{bone}.z": 25 for finger in ("index", "middle") for bone in ("proximal", "distal")}
+        degrees |= {
+            "index_intermediate.z": 60,
+            "middle_intermediate.z": 60,
+            "ring_intermediate.z": 60,
+            "ring_proximal.z": 40,
+        }
+        degrees |= {"little_intermediate.z": 70, "little_proximal.z": 50}
+        curled = set_angles(rig, contact.Pose.rest(rig), {dof: np.radians(a) for dof, a in degrees.items()})
+
+        def on_ball(direction: tuple[float, float, float]) -> contact.SurfacePoints:
+            return ball.closest([0.05 * np.array(direction)]).points
+
+        def solved(caption: str) -> None:
+            began = time.process_time()
+            proposal = session.solve(
+                prior={"hand": curled} if "knuckle" in caption else "rest", terms=["penetration"]
+            )
+            cost = f"solved in {1000 * (time.process_time() - began):.0f} ms of a processor"
+            session.accept(proposal)
+            pictures.append(view(session, caption=caption, camera_from=(0.45, 0.8, 1.0), frame=["hand", "ball"]))
+            mean = 1000.0 * np.mean([pair.mean for pair in proposal.after.patches.values()])
+            deep = 1000.0 * deepest(session, "hand", "ball")
+            sheet.measure(
+                caption[4:], f"{mean:.1f} mm apart, {deep:.1f} mm deep, {cost}", claims[len(pictures) - 1]
+            )
+
+        pictures: list[Picture] = []
+        claims = ("", "2 translations, 1 rotation", "3 translations")
+        with sheet.counting(session):
+            for pad, (along, start) in PADS.items():
+                paint_pad(session, "hand", pad, pad, along=along)
+                copy = session.patches.transfer(pad, "ball", on_ball(start), name=f"{pad} there", direction=AHEAD)
+                session.pairs.add(pad, copy, name=pad)
+            solved("(a) knuckleball")
+            session.patches.translate("index_distal there", on_ball((0.3, 0.85, 0.45)))
+            session.patches.translate("middle_distal there", on_ball((-0.15, 0.9, 0.45)))
+            session.patches.rotate("thumb_distal there", np.radians(20.0))
+            solved("(b) two-seam fastball")
+            session.patches.translate("index_distal there", on_ball((-0.05, 0.95, 0.4)))
+            session.patches.translate("middle_distal there", on_ball((-0.45, 0.8, 0.45)))
+            session.patches.translate("thumb_distal there", on_ball((0.7, -0.7, 0.0)))
+            solved("(c) curveball")
+        sheet.show(*pictures)

@@ -1,0 +1,65 @@
+"""Grasps of four manipulators: human, witch, alien, tentacle.
+
+Each is a recipe: pads by joint, roughly how the object lies in the hand, and what a grasp has to reach to be called
+one. `contact pose RECIPE.toml --out DIR` runs the same recipes from the command line.
+"""
+
+from importlib.resources import files
+
+import numpy as np
+
+from contact_builtins.demos import demo_recipe
+from contact_core.job.recipe import Recipe
+from contact_core.job.recipe_reader import parse_recipe
+from contact_core.job.run import perform
+from contact_gallery.looks import LOOKS, SKIN, view
+from contact_gallery.sheet import Sheet
+
+PAPER = "Figures 1, 6 and 8"
+ROWS = (("mug", "baseball", "pole"), ("witch", "witch_pole", "witch_ball"), ("alien", "alien_ball", "alien_mug"))
+
+
+def draw(sheet: Sheet) -> None:
+    for names in ROWS:
+        pictures = []
+        for name in names:
+            recipe = recipe_of(name)
+            job = perform(recipe, sheet.plugins)
+            job.session.surfaces.set_pose("manipulator", job.pose)
+            steps = [step.command.label().split()[0] for step in job.session.history.done]
+            sheet.operations += sum(word in ("Paint", "Transfer", "Pair") for word in steps) + 1  # and the solve
+            touched = np.concatenate(
+                [pair.object_points.positions(job.object.mesh) for pair in job.session.geometry.pairs()]
+            )
+            around = np.concatenate(
+                [
+                    touched @ job.placed[:3, :3].T + job.placed[:3, 3],
+                    job.session.geometry.posed_mesh("manipulator").points,
+                ]
+            )
+            kind = recipe.manipulator.sample or ""
+            skin = next((color for word, color in LOOKS.items() if kind.startswith(word)), SKIN)
+            pictures.append(
+                view(
+                    job.session,
+                    camera_from=recipe.view.camera_from or (0.6, 0.4, 1.0),
+                    up=recipe.view.up,
+                    caption=recipe.title,
+                    colors={"manipulator": skin},
+                    focus=around,
+                    axes=False,
+                )
+            )
+            apart, deep = (
+                100.0 * (job.metrics[key] or 0.0) for key in ("mean_contact_distance", "max_penetration")
+            )
+            told = f"contacts {apart:.1f} % of a hand apart, skin {deep:.1f} % deep, {job.seconds['solve']:.2f} s"
+            judged = "a grasp" if job.verdict.is_grasp else job.verdict.failures[0]
+            sheet.measure(recipe.title, f"{told}; {judged}")
+        sheet.show(*pictures, aspect=1.2)
+
+
+def recipe_of(name: str) -> Recipe:
+    """A demo of the package, or a recipe of the gallery."""
+    own = files("contact_gallery.grasps") / f"{name}.toml"
+    return parse_recipe(own.read_text(encoding="utf-8"), name=name) if own.is_file() else demo_recipe(name)
