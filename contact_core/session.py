@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from contact_core.document.asset import Asset
     from contact_core.geometry.engine import GeodesicEngine
     from contact_core.plugins.manager import PluginManager
-    from contact_core.proposals.proposal import Proposal
+    from contact_core.proposals.proposal import Ghost
     from contact_core.rig.rig import Pose
     from contact_core.scene.binding import Binding
     from contact_core.scene.link import HostLink
@@ -429,7 +429,7 @@ class Session(ProposingSession):
         """Call `listener` after every change and preview, in their order; the returned function stops that."""
         return self._listeners.listen(listener)
 
-    def show_ghost(self, ghost: Proposal | None) -> None:
+    def show_ghost(self, ghost: Ghost | None) -> None:
         """Tell listeners of a preview of what is proposed; None: back to the document."""
         self._preview(self.document, self.document if ghost is None else ghost.ghost)
 

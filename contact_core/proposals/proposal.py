@@ -37,22 +37,30 @@ AGAIN = ("current",)  # starting candidates once there is a pose
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
-    """A pose, perhaps with contacts moved, not yet committed.
+class Ghost:
+    """Something that is shown and not yet committed.
 
     command: what accepting commits. ghost: the document with it, which adapters show. revision: of the document
-    that it was made for. before, after: solutions with the contacts where they were, and as proposed; the same
-    where no contact moves. left_out: pairs that stay where they are, with the reason. keys: by frame, the poses by
-    surface that accepting keys in the scene; empty for a solve without frames. solutions: one for each frame.
+    that it was made for. keys: by frame, the poses by surface that accepting keys in the scene.
     """
 
     command: Command
     ghost: ContactDocument
     revision: int
+    keys: Mapping[float, Mapping[str, Pose]] = field(default_factory=dict, kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal(Ghost):
+    """A pose, perhaps with contacts moved, not yet committed.
+
+    before, after: solutions with the contacts where they were, and as proposed; the same where no contact moves.
+    left_out: pairs that stay where they are, with the reason. solutions: one for each frame.
+    """
+
     before: PoseSolution
     after: PoseSolution
     left_out: Mapping[str, str] = field(default_factory=dict)
-    keys: Mapping[float, Mapping[str, Pose]] = field(default_factory=dict)
     solutions: tuple[PoseSolution, ...] = ()
 
     @property

@@ -15,10 +15,12 @@ from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 if TYPE_CHECKING:
     from contact_core.edit.command import Command
     from contact_core.edit.verbs import Film
+    from contact_core.motion.detection import DetectionOptions
     from contact_core.plugins.manager import PluginManager
+    from contact_core.proposals.detection import Detection
     from contact_core.proposals.draft import Draft
     from contact_core.proposals.motion import MotionSettings
-    from contact_core.proposals.proposal import Proposal, SolveSettings
+    from contact_core.proposals.proposal import Ghost, Proposal, SolveSettings
     from contact_core.rig.rig import Pose, Rig
     from contact_core.scene.binding import Binding
     from contact_core.scene.problem import Objective
@@ -64,7 +66,7 @@ class ProposingSession(ABC):
         """Revision of the committed document."""
 
     @abstractmethod
-    def show_ghost(self, ghost: Proposal | None) -> None:
+    def show_ghost(self, ghost: Ghost | None) -> None:
         """Tell listeners of a preview; None: back to the document."""
 
     @abstractmethod
@@ -131,6 +133,29 @@ class ProposingSession(ABC):
         """The pose problem of the document as the scene has it now: what `solve` gives to a solver."""
         return self._draft().problem(objective)
 
+    def detect(
+        self,
+        frames: Sequence[float] | None = None,
+        *,
+        options: DetectionOptions | None = None,
+        progress: Progress = NO_PROGRESS,
+    ) -> Detection:
+        """Propose the contacts of an animation: skin that is close to an object and slow over it becomes patches,
+        pairs and spans.
+
+        frames: by default all of the timeline. The animation is that of the scene, or of the document's own keys.
+        Raises InvalidInput without a rig or an object, and Cancelled.
+        """
+        from contact_core.proposals.detection import detect
+
+        chosen = self.timeline.settings.frames() if frames is None else frames
+        found = detect(
+            self.timed_document, self.timeline.frame, chosen, self._draft, self.derived, self.rigs, self.revision,
+            options, progress,
+        )  # fmt: skip
+        self.show_ghost(found)
+        return found
+
     def settle(
         self, *, rounds: int = ROUNDS, reach: float = REACH, settings: SolveSettings | None = None
     ) -> Proposal:
@@ -166,7 +191,7 @@ class ProposingSession(ABC):
         self.show_ghost(found)
         return found
 
-    def accept(self, proposal: Proposal) -> None:
+    def accept(self, proposal: Ghost) -> None:
         """Commit a proposal: contacts and poses of the document, poses and keys of the scene, as one undo step.
 
         Raises CommandRejected when the document has changed since.
@@ -175,7 +200,7 @@ class ProposingSession(ABC):
             raise CommandRejected("the document has changed since this was proposed: propose again.")
         self.do(proposal.command, keys=proposal.keys)
 
-    def dismiss(self, proposal: Proposal) -> None:
+    def dismiss(self, proposal: Ghost) -> None:
         """Take the ghost away; nothing was committed."""
         if proposal.revision == self.revision:
             self.show_ghost(None)

@@ -10,7 +10,9 @@ import pytest
 import contact_core as contact
 from contact_core.document.schema import dump_document, inconsistencies
 from contact_core.document.timeline import PoseKey, address
+from contact_core.edit.commands import SetKeys
 from contact_core.errors import Cancelled, InvalidInput
+from contact_core.motion.detection import DetectionOptions
 from contact_core.motion.problem import MotionWeights
 from contact_core.motion.reduction import skin_errors
 from contact_core.motion.report import motion_report
@@ -21,6 +23,7 @@ from contact_core.session import Session
 from contact_core.solve.solver import SolveStatus
 from contact_core.testing import meshes
 from contact_core.testing.host_scenes import arm_rig
+from contact_core.testing.rigs import tentacle
 
 ARM, BALL = "arm", "ball"
 
@@ -165,8 +168,6 @@ def test_a_clip_is_followed(session: Session) -> None:
     bent[-1, :3, :3] = bent[-1, :3, :3] @ np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
     keys = tuple(PoseKey(f, contact.Pose(rig.joints, local), None, "smooth", "clip")
                  for f, local in ((0.0, rig.rest_local), (24.0, bent)))  # fmt: skip
-    from contact_core.edit.commands import SetKeys
-
     session.do(SetKeys(address("pose", ARM), keys))
     followed = solved(session, motion=MotionSettings(weights=MotionWeights(follow=50.0)), prior="current")
     free = solved(session, prior="current")
@@ -217,3 +218,81 @@ def test_the_report_is_that_of_the_motion(session: Session) -> None:
     assert found.motion is not None
     report, again = found.report(), motion_report(found.motion.motion, found.motion.thetas)
     assert report.pairs == again.pairs and report.keys == {ARM: len(found.reductions[ARM].keys.frames)}
+
+
+# --- detection ----------------------------------------------------------------------------------------------
+
+
+def visit(skate: float) -> Session:
+    """A tentacle comes down onto a floor in 12 frames, stands there for 24, slipping to and fro, and leaves."""
+    rig = tentacle(3)
+    rig = replace(rig, faces=rig.faces[:, ::-1])  # with its skin outside
+    low = float(rig.surface.points[:, 1].min())
+    plane = meshes.plane(16, 40.0)
+    flat = (plane.points - plane.points.mean(axis=0))[:, [0, 2, 1]] + [0.0, low, 0.0]
+    floor = contact.TriangleMesh(flat, plane.faces[:, ::-1])
+    session = Session(discover=False)
+    session.surfaces.add("arm", rig.surface, rig=rig)
+    session.surfaces.add("floor", floor)
+    session.timeline.set(0, 48)
+    keys = []
+    for frame in range(49):
+        local = rig.rest_local.copy()
+        local[0, :3, 3] += [skate * np.sin(0.8 * frame), 0.3 * max(12 - frame, 0, frame - 36), 0.0]
+        keys.append(PoseKey(float(frame), contact.Pose(rig.joints, local), None, "linear", "clip"))
+    session.do(SetKeys(address("pose", "arm"), tuple(keys)))
+    return session
+
+
+def test_the_contacts_of_a_clip_are_proposed_accepted_and_hold() -> None:
+    session = visit(0.02)
+    told: list[contact.ContactDocument] = []
+    session.listen(lambda change: told.append(change.after))
+    before, steps = dump_document(session.timed_document), len(session.history.steps)
+    found = session.detect(options=DetectionOptions(near=0.04, far=0.08))
+    assert dump_document(session.timed_document) == before and told[-1].pairs  # a ghost
+    feet = [each for each in found.found if each.span.joint == "link00"]
+    assert len(feet) == 1 and abs(feet[0].span.on - 12) <= 3 and abs(feet[0].span.off - 36) <= 3
+    session.accept(found)
+    assert len(session.history.steps) == steps + 1 and not list(inconsistencies(session.timed_document))
+    foot = feet[0]
+    (span,) = session.timeline.spans(foot.pair)
+    assert (span.on, span.off) == (foot.span.on, foot.span.off)
+    session.timeline.go(24)
+    (pair,) = (pair for pair in session.geometry.pairs() if pair.pair.name == foot.pair)
+    here = pair.manipulator_points.positions(session.geometry.mesh("arm"))
+    there = pair.object_points.positions(session.geometry.mesh("floor"))
+    assert np.linalg.norm(here - there, axis=1).mean() < 0.35  # the pad lies where it was seen
+
+    weights = MotionWeights(skate=50.0, follow=100.0)
+    repaired = session.solve(
+        frames=session.timeline.settings.frames(), motion=MotionSettings(weights=weights), prior="current",
+        pairs=[foot.pair],
+    )  # fmt: skip
+    assert isinstance(repaired, MotionProposal) and repaired.motion is not None
+    motion = repaired.motion.motion
+    clip = np.array([problem.start for problem in motion.problems])
+    skates = [
+        motion_report(motion, thetas, solids={}).pairs[foot.pair].skate_rms
+        for thetas in (clip, repaired.motion.thetas)
+    ]
+    assert skates[1] < 0.25 * skates[0]
+    session.undo()
+    assert dump_document(session.timed_document) == before
+
+
+def test_nothing_is_proposed_where_nothing_touches_and_the_rest_is_said() -> None:
+    session = visit(0.0)
+    session.timeline.key(
+        "place", "floor", np.array([[1, 0, 0, 0], [0, 1, 0, -9], [0, 0, 1, 0], [0, 0, 0, 1.0]]), frame=0
+    )
+    assert session.detect().found == ()
+    alone = contact.new(arm=assets()[ARM], discover=False)
+    with pytest.raises(InvalidInput, match="an object"):
+        alone.detect([0, 1])
+    with pytest.raises(Cancelled):
+        session.detect(progress=CallbackProgress(lambda fraction, text: _stop()))
+
+
+def _stop() -> None:
+    raise Cancelled("enough")
