@@ -21,6 +21,7 @@ def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], nam
 
     Raises InvalidInput naming the array when the shape does not fit or a value is NaN or infinite.
     """
+    wanted = np.dtype(dtype)
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as error:
@@ -29,9 +30,9 @@ def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], nam
         array = np.zeros(tuple(extent or 0 for extent in shape))
     if array.dtype.kind not in "biufc":
         raise InvalidInput(f"{name} must be an array of numbers of shape {_spell(shape)}; got {array.dtype}.")
-    if array.dtype.kind == "c" and not np.issubdtype(np.dtype(dtype), np.complexfloating):
+    if array.dtype.kind == "c" and wanted.kind != "c":
         raise InvalidInput(f"{name} must hold real numbers, but holds complex ones ({array.dtype}).")
-    wants_whole = np.issubdtype(np.dtype(dtype), np.integer) and array.dtype.kind == "f"
+    wants_whole = wanted.kind in "iu" and array.dtype.kind == "f"
     if wants_whole and not (np.isfinite(array).all() and np.array_equal(array, np.trunc(array))):
         raise InvalidInput(f"{name} must hold whole numbers, but holds fractions or NaN ({array.dtype}).")
     fits = array.ndim == len(shape) and all(
@@ -39,10 +40,10 @@ def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], nam
     )
     if not fits:
         raise InvalidInput(f"{name} must have shape {_spell(shape)}, but has {array.shape}.")
-    if not (array.dtype == np.dtype(dtype) and array.flags.c_contiguous and _is_immutable(array)):
+    if not (array.dtype == wanted and array.flags.c_contiguous and _is_immutable(array)):
         array = np.array(array, dtype=dtype, order="C", copy=True)
         array.setflags(write=False)
-    if np.issubdtype(array.dtype, np.inexact) and not np.isfinite(array).all():
+    if array.dtype.kind in "fc" and not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise InvalidInput(f"{name} must be finite, but entry {where} is {array[tuple(where)]}.")
     return array

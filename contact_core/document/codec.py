@@ -12,8 +12,8 @@ import json
 import math
 import types
 import typing
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -154,28 +154,49 @@ def _unaliased(annotation: Any) -> Any:
     return annotation if value is None else value[get_args(annotation)]
 
 
+Decoder = Callable[[Any, str], Any]
+
+
 def _decode(annotation: Any, data: Any, where: str) -> Any:
+    return _decoder(annotation)(data, where)
+
+
+@cache
+def _decoder(annotation: Any) -> Decoder:
+    """What decodes data of an annotation: looked into once, for a document has a hundred values a patch."""
     annotation = _unaliased(annotation)
     origin = get_origin(annotation)
     if origin in (Union, types.UnionType):
-        return _decode_union(annotation, data, where)
+        return _union_decoder(annotation)
     if origin is Literal:
-        if data not in get_args(annotation):
-            raise FileRefused(f"{where} is one of {get_args(annotation)}, but got {data!r}.")
-        return data
+        return partial(_decode_literal, get_args(annotation))
     if origin is FrozenMap:
-        (item_type,) = get_args(annotation)
-        items = _object(data, where)
-        return FrozenMap({key: _decode(item_type, item, f"{where}.{key}") for key, item in items.items()})
+        return partial(_decode_map, _decoder(get_args(annotation)[0]))
     if origin is tuple:
-        return _decode_tuple(get_args(annotation), data, where)
+        return _tuple_decoder(get_args(annotation))
     if origin is np.ndarray:
-        return _decode_array(annotation, data, where)
+        return partial(_decode_array, np.dtype(get_args(get_args(annotation)[1])[0]))
     if annotation is Any:
-        return freeze_json(data)
+        return lambda data, where: freeze_json(data)
     if dataclasses.is_dataclass(annotation) and isinstance(annotation, type):
-        return _decode_dataclass(annotation, data, where)
-    return _decode_scalar(annotation, data, where)
+        return partial(_decode_dataclass, annotation)
+    return _decode_float if annotation is float else partial(_decode_scalar, annotation)
+
+
+def _decode_literal(choices: tuple[Any, ...], data: Any, where: str) -> Any:
+    if data not in choices:
+        raise FileRefused(f"{where} is one of {choices}, but {data!r} came.")
+    return data
+
+
+def _decode_map(item: Decoder, data: Any, where: str) -> FrozenMap[Any]:
+    return FrozenMap({key: item(value, f"{where}.{key}") for key, value in _object(data, where).items()})
+
+
+def _decode_float(data: Any, where: str) -> float:
+    if type(data) is float and math.isfinite(data):
+        return data
+    return float(_decode_scalar(float, data, where))
 
 
 def _decode_scalar(annotation: Any, data: Any, where: str) -> Any:
@@ -189,39 +210,51 @@ def _decode_scalar(annotation: Any, data: Any, where: str) -> Any:
         return _finite(float(data), where)
     if annotation is complex and isinstance(data, list) and len(data) == 2:
         return complex(_finite(float(data[0]), where), _finite(float(data[1]), where))
-    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but got {str(data)[:60]!r}.")
+    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but {str(data)[:60]!r} came.")
 
 
-def _decode_union(annotation: Any, data: Any, where: str) -> Any:
-    if data is None and type(None) in get_args(annotation):
-        return None
+def _union_decoder(annotation: Any) -> Decoder:
+    """Of an optional value, or of dataclasses that say which one they are."""
     members = _members(annotation)
+    optional = type(None) in get_args(annotation)
     if len(members) > 1:
-        kind = _object(data, where).get("is")
-        for member in members:
-            if member.__name__ == kind:
-                return _decode_dataclass(member, data, where)
-        names = ", ".join(member.__name__ for member in members)
-        raise FileRefused(f'{where} needs a key "is" that is one of {names}, but got {kind!r}.')
+        decoders: Mapping[Any, Decoder] = {member.__name__: _decoder(member) for member in members}
+        several = partial(_decode_tagged, decoders)
+        return partial(_decode_optional, several) if optional else several
     (only,) = [member for member in get_args(annotation) if member is not type(None)]
-    return _decode(only, data, where)
+    return partial(_decode_optional, _decoder(only))
 
 
-def _decode_tuple(item_types: tuple[Any, ...], data: Any, where: str) -> tuple[Any, ...]:
-    if not isinstance(data, (list, tuple)) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list, but got {str(data)[:60]!r}.")
+def _decode_optional(item: Decoder, data: Any, where: str) -> Any:
+    return None if data is None else item(data, where)
+
+
+def _decode_tagged(members: Mapping[Any, Decoder], data: Any, where: str) -> Any:
+    kind = _object(data, where).get("is")
+    if isinstance(kind, str) and kind in members:
+        return members[kind](data, where)
+    raise FileRefused(f'{where} needs a key "is" that is one of {", ".join(members)}, but {kind!r} came.')
+
+
+def _tuple_decoder(item_types: tuple[Any, ...]) -> Decoder:
     if len(item_types) == 2 and item_types[1] is Ellipsis:
-        return tuple(_decode(item_types[0], item, f"{where}[{k}]") for k, item in enumerate(data))
-    if len(item_types) != len(data):
-        raise FileRefused(f"{where} wants {len(item_types)} items, but got {len(data)}.")
-    pairs = zip(item_types, data, strict=True)
-    return tuple(_decode(item_type, item, f"{where}[{k}]") for k, (item_type, item) in enumerate(pairs))
+        return partial(_decode_items, _decoder(item_types[0]))
+    return partial(_decode_tuple, tuple(map(_decoder, item_types)))
 
 
-def _decode_array(annotation: Any, data: Any, where: str) -> np.ndarray[Any, Any]:
+def _decode_items(item: Decoder, data: Any, where: str) -> tuple[Any, ...]:
+    return tuple(item(value, f"{where}[{k}]") for k, value in enumerate(_list(data, where)))
+
+
+def _decode_tuple(items: tuple[Decoder, ...], data: Any, where: str) -> tuple[Any, ...]:
+    if len(_list(data, where)) != len(items):
+        raise FileRefused(f"{where} wants {len(items)} items, but {len(data)} came.")
+    return tuple(item(value, f"{where}[{k}]") for k, (item, value) in enumerate(zip(items, data, strict=True)))
+
+
+def _decode_array(dtype: np.dtype[Any], data: Any, where: str) -> np.ndarray[Any, Any]:
     if not isinstance(data, list) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list of numbers, but got {str(data)[:60]!r}.")
-    dtype = np.dtype(get_args(get_args(annotation)[1])[0])
+        raise FileRefused(f"{where} wants a list of numbers, but {str(data)[:60]!r} came.")
     complex_wanted = dtype.kind == "c"
     raw = np.array(data, dtype=np.float64 if complex_wanted else None)
     if raw.dtype.kind not in "biuf" or (raw.dtype.kind == "f" and not np.isfinite(raw).all()):
@@ -241,15 +274,15 @@ def _decode_dataclass(cls: type, data: Any, where: str) -> Any:
     items = dict(_object(data, where))
     if getattr(cls, "json_union", False) and items.pop("is", cls.__name__) != cls.__name__:
         raise FileRefused(f"{where} wants a {cls.__name__}.")
-    fields = {item.name: item for item in dataclasses.fields(cls)}
-    unknown = sorted(set(items) - set(fields))
+    fields = _field_decoders(cls)
+    unknown = sorted(items.keys() - fields.keys())
     if unknown:
         raise FileRefused(f"{where} has no field {unknown[0]!r}; it has {', '.join(fields)}.")
-    hints, values = _hints(cls), {}
-    for name, item in fields.items():
+    values = {}
+    for name, (decoder, needed) in fields.items():
         if name in items:
-            values[name] = _decode(hints[name], items[name], f"{where}.{name}")
-        elif item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING:
+            values[name] = decoder(items[name], f"{where}.{name}")
+        elif needed:
             raise FileRefused(f"{where} lacks the field {name!r}.")
     try:
         return cls(**values)
@@ -257,10 +290,26 @@ def _decode_dataclass(cls: type, data: Any, where: str) -> Any:
         raise FileRefused(f"{where} does not fit: {error}") from error
 
 
+@cache
+def _field_decoders(cls: type) -> Mapping[str, tuple[Decoder, bool]]:
+    """The decoder of each field of a dataclass, and whether it has to be there."""
+    missing = dataclasses.MISSING
+    return {
+        item.name: (_decoder(_hints(cls)[item.name]), item.default is missing and item.default_factory is missing)
+        for item in dataclasses.fields(cls)
+    }
+
+
 def _object(data: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
         raise FileRefused(f"{where} wants an object, but got {str(data)[:60]!r}.")
     return typing.cast("Mapping[str, Any]", data)
+
+
+def _list(data: Any, where: str) -> Sequence[Any]:
+    if not isinstance(data, (list, tuple)) or len(data) > MAX_ARRAY:
+        raise FileRefused(f"{where} wants a list, but {str(data)[:60]!r} came.")
+    return data
 
 
 def _text(data: Any, where: str) -> str:

@@ -99,8 +99,19 @@ def stated_digest(text: bytes) -> str | None:
 
 def written_digest(text: bytes) -> str:
     """The digest of a document file that lies as `dump_document` wrote it; any other file gets another digest."""
+    return _digest(written_content(text))
+
+
+def written_content(text: bytes) -> bytes:
+    """A document file that lies as `dump_document` wrote it without the line that states the digest."""
     lines = text.split(b"\n", 2)
-    return _digest(lines[0] + b"\n" + lines[2] if len(lines) == 3 and lines[1].startswith(_DIGEST_LINE) else text)
+    return lines[0] + b"\n" + lines[2] if len(lines) == 3 and lines[1].startswith(_DIGEST_LINE) else text
+
+
+def content_of(text: bytes, digest: str) -> bytes | None:
+    """The canonical bytes of the document of this digest that a file holds; None where it lies otherwise."""
+    content = written_content(text)
+    return content if _digest(content) == digest else None
 
 
 def parse_edited(text: bytes, source: str = "the document") -> ContactDocument:

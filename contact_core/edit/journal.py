@@ -8,6 +8,7 @@ thread flushes it to the disk within FLUSH_SECONDS, which is the window that a p
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import threading
 from pathlib import Path
@@ -17,7 +18,7 @@ from contact_core.atomic_file import write_atomic
 from contact_core.document.schema import document_digest, document_to_json
 from contact_core.edit.command import command_to_json
 from contact_core.edit.history import History, Step
-from contact_core.edit.journal_file import ID_DIGITS, SCHEMA, VERSION, encode_line
+from contact_core.edit.journal_file import ID_DIGITS, SCHEMA, VERSION, encode_head, encode_line
 from contact_core.errors import FileRefused
 
 FLUSH_SECONDS = 0.1
@@ -46,25 +47,22 @@ class Journal:
         self._flusher: threading.Thread | None = None
 
     @classmethod
-    def start(cls, path: Path, history: History, file_digest: str | None) -> Journal:
+    def start(cls, path: Path, history: History, file_digest: str | None, content: bytes | None = None) -> Journal:
         """A new journal of a history, with its steps so far, written atomically and flushed. Raises FileRefused.
 
-        file_digest: of the document in the file on the disk, None where there is none yet.
+        file_digest: of the document in the file on the disk, None where there is none yet. content: the
+        canonical bytes of the history's base, where they are the document in the file, so that none are made.
         """
-        header = {
-            "journal": SCHEMA,
-            "version": VERSION,
-            "revision": history.base_revision,
-            "file": file_digest,
-            "document": document_to_json(history.base),
-        }
-        events = [header, *(_event_of(step) for step in history.steps)]
+        header = {"journal": SCHEMA, "version": VERSION, "revision": history.base_revision, "file": file_digest}
+        events = [_event_of(step) for step in history.steps]
         if history.can_redo:
             events.append({"goto": history.revision})
-        journal_id = document_digest(history.base)[:ID_DIGITS]
-        lines = (encode_line(event, number, journal_id) for number, event in enumerate(events, start=1))
-        write_atomic(path, b"".join(lines))
-        return cls(path, len(events), journal_id)
+        known = content is not None and file_digest is not None
+        journal_id = (file_digest if known and file_digest else document_digest(history.base))[:ID_DIGITS]
+        text = content if known and content else json.dumps(document_to_json(history.base)).encode()
+        lines = (encode_line(event, number, journal_id) for number, event in enumerate(events, start=2))
+        write_atomic(path, encode_head(header, text, journal_id) + b"".join(lines))
+        return cls(path, 1 + len(events), journal_id)
 
     def did(self, step: Step) -> None:
         """Record a step about to be committed.

@@ -13,6 +13,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -29,31 +30,69 @@ MAX_BYTES = 4 << 30
 UPGRADES: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}  # of the first line, by version
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Line:
     """A sound line. number: 1 is the first line, with the document that the journal begins with; then events."""
 
     number: int
     journal_id: str
-    event: dict[str, Any]
+    text: bytes
+
+    @cached_property
+    def event(self) -> dict[str, Any]:
+        """What it says. The first line, which is long, is read when it is wanted; other lines have been.
+
+        Raises FileRefused for what is no JSON object.
+        """
+        try:
+            event = json.loads(self.text)
+        except (ValueError, RecursionError) as error:
+            raise FileRefused(f"line {self.number} of the journal is no JSON: {error}.") from error
+        if not isinstance(event, dict):
+            raise FileRefused(f"line {self.number} of the journal is no JSON object.")
+        return event
 
 
 @dataclass(frozen=True, eq=False)
 class JournalContents:
     """The sound lines of a journal.
 
-    base: the document that it begins with, None where the first line is lost; file_digest: of the document file
-    then, None without one. lines: the events, in order. damage: None, or a sentence on what is lost. cut_off:
-    whether damage follows the last of the lines.
+    first: the line with the document that it begins with, None where it is lost. lines: the events, in order.
+    damage: None, or a sentence on what is lost. cut_off: whether damage follows the last of the lines. name: of the
+    file.
     """
 
-    base: ContactDocument | None
-    base_revision: int
-    file_digest: str | None
+    first: Line | None
     journal_id: str
     lines: tuple[Line, ...]
     damage: str | None
     cut_off: bool
+    name: str
+
+    @cached_property
+    def _head(self) -> tuple[Mapping[str, Any], int, str | None]:
+        return ({}, 0, None) if self.first is None else _read_head(self.first.event, self.name)
+
+    @property
+    def base_revision(self) -> int:
+        """Revision of the document that it begins with."""
+        return self._head[1]
+
+    @property
+    def file_digest(self) -> str | None:
+        """Digest of the document file when it began, None without one."""
+        return self._head[2]
+
+    @cached_property
+    def base(self) -> ContactDocument | None:
+        """The document that it begins with, None where the first line is lost.
+
+        Raises FileRefused for what is none. It is made when it is wanted: opening a document whose session ended in
+        order never asks for it.
+        """
+        if self.first is None:
+            return None
+        return document_from_json(self._head[0].get("document"), f"the document in {self.name}")
 
     @property
     def events(self) -> tuple[dict[str, Any], ...]:
@@ -101,15 +140,29 @@ def read_journal(path: Path) -> JournalContents:
     in_order = len(lines) == len(sound) and list(lines) == sorted(lines) and found.count(None) == cut_off
     damage = _damage(path.name, sorted(lines), cut_off, in_order)
     head = lines.pop(1, None)
-    base, revision, digest = (None, 0, None) if head is None else _read_head(head.event, path)
     events = tuple(lines[number] for number in sorted(lines))
-    return JournalContents(base, revision, digest, journal_id, events, damage, cut_off)
+    contents = JournalContents(head, journal_id, events, damage, cut_off, path.name)
+    if not contents.closed:
+        _ = contents.base  # refused now where it is none
+    return contents
 
 
 def encode_line(event: Mapping[str, Any], number: int, journal_id: str) -> bytes:
     """One line of a journal."""
-    body = b"%d %b " % (number, journal_id.encode())
-    body += json.dumps(event, separators=(",", ":"), allow_nan=False).encode()
+    return _line(json.dumps(event, separators=(",", ":"), allow_nan=False).encode(), number, journal_id)
+
+
+def encode_head(header: Mapping[str, Any], document: bytes, journal_id: str) -> bytes:
+    """The first line of a journal, which holds a document; document: its JSON, in any layout.
+
+    Line ends within JSON lie between its words, because a text spells them as escapes: a blank does the same.
+    """
+    start = json.dumps(header, separators=(",", ":"), allow_nan=False).encode().removesuffix(b"}")
+    return _line(b'%b,"document":%b}' % (start, document.replace(b"\n", b" ")), 1, journal_id)
+
+
+def _line(text: bytes, number: int, journal_id: str) -> bytes:
+    body = b"%d %b %b" % (number, journal_id.encode(), text)
     return b"%08x %b\n" % (zlib.crc32(body), body)
 
 
@@ -118,13 +171,13 @@ def decode_line(raw: bytes) -> Line | None:
     if raw[8:9] != b" " or not raw.endswith(b"\n") or b"%08x" % zlib.crc32(raw[9:-1]) != raw[:8]:
         return None
     try:
-        number, journal_id, body = raw[9:-1].split(b" ", 2)
-        event = json.loads(body)
-        if isinstance(event, dict) and 0 < int(number) < 1 << 62:
-            return Line(int(number), journal_id.decode("ascii"), event)
-    except (ValueError, RecursionError):  # sound, but nothing that a journal would hold
-        pass
-    return None
+        number, journal_id, text = raw[9:-1].split(b" ", 2)
+        line = Line(int(number), journal_id.decode("ascii"), text)
+        if line.number > 1:
+            _ = line.event
+        return line if 0 < line.number < 1 << 62 else None
+    except (ValueError, FileRefused):  # sound, but nothing that a journal would hold
+        return None
 
 
 def whole_number(data: Mapping[str, Any], key: str) -> int:
@@ -140,13 +193,12 @@ def _is_save(event: Mapping[str, Any]) -> bool:
     return isinstance(event.get("file"), str) and isinstance(revision, int) and 0 <= revision < 1 << 63
 
 
-def _read_head(head: dict[str, Any], path: Path) -> tuple[ContactDocument, int, str | None]:
-    body = open_envelope(head, SCHEMA, VERSION, UPGRADES, str(path), schema_key="journal")
-    base = document_from_json(body.get("document"), f"the document in {path.name}")
+def _read_head(head: dict[str, Any], name: str) -> tuple[Mapping[str, Any], int, str | None]:
+    body = open_envelope(head, SCHEMA, VERSION, UPGRADES, name, schema_key="journal")
     revision, digest = whole_number(body, "revision"), body.get("file")
     if not (digest is None or isinstance(digest, str)):
-        raise FileRefused(f"{path} names no document file that could be ({str(digest)[:60]!r}).")
-    return base, revision, digest
+        raise FileRefused(f"{name} names no document file that could be ({str(digest)[:60]!r}).")
+    return body, revision, digest
 
 
 def _damage(name: str, numbers: list[int], cut_off: bool, in_order: bool) -> str | None:

@@ -11,6 +11,7 @@ from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import (
     MAX_BYTES,
+    content_of,
     document_digest,
     dump_with_digest,
     parse_edited,
@@ -44,13 +45,17 @@ class OpenedFile:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What lies on the disk. document, digest: empty and None where there is no file, or a damaged one."""
+    """What lies on the disk. document, digest: empty and None where there is no file, or a damaged one.
+
+    content: the canonical bytes of the document, where the file has them.
+    """
 
     path: Path
     lock: DocumentLock
     notes: list[str]
     document: ContactDocument = field(default_factory=ContactDocument)
     digest: str | None = None
+    content: bytes | None = None
     damaged: bool = False
 
     @property
@@ -153,8 +158,10 @@ def set_aside(path: Path) -> str | None:
         old = read_journal(beside) if beside.exists() else None
     except FileRefused:
         return _keep(beside, "damaged").name
-    if old is None:
-        return None
+    return None if old is None else _set_aside(beside, old)
+
+
+def _set_aside(beside: Path, old: JournalContents) -> str | None:
     if old.damage or (not old.closed and old.edits):
         return _keep(beside, "damaged" if old.damage else "unused").name
     beside.replace(beside.with_name(beside.name + ".previous"))
@@ -166,7 +173,9 @@ def _open_locked(path: Path, lock: DocumentLock, commands: CommandTable) -> Open
     found = _Found(path, lock, notes)
     try:
         if path.exists():
-            found = _Found(path, lock, notes, *read_document(path))
+            raw = read_bounded(path, MAX_BYTES)
+            document, digest = parse_with_digest(raw, str(path))
+            found = _Found(path, lock, notes, document, digest, content_of(raw, digest))
     except FileRefused as error:
         if old is None or isinstance(error, EditedFile) or "newer contact-core" in str(error):
             raise  # what can be read is somebody's edit, perhaps
@@ -185,7 +194,7 @@ def _open_locked(path: Path, lock: DocumentLock, commands: CommandTable) -> Open
 def _begin(found: _Found, old: JournalContents | None) -> OpenedFile:
     """Open a document as its file has it, with a new journal; an old one that may hold more is kept."""
     name = found.path.name
-    kept = set_aside(found.path) if old is not None else None
+    kept = _set_aside(found.journal, old) if old is not None else None
     if old is not None and kept is not None:
         state = f"{name} was changed by something else since its journal was written"
         if old.damage:
@@ -193,7 +202,7 @@ def _begin(found: _Found, old: JournalContents | None) -> OpenedFile:
             state = f"{old.damage} {name} is opened as it was saved ({ending})"
         found.notes.append(f"{state}; the journal is kept as {kept} (contact replay reads it).")
     history = History(found.document)
-    journal = Journal.start(found.journal, history, found.digest)
+    journal = Journal.start(found.journal, history, found.digest, found.content)
     return OpenedFile(found.path, history, journal, found.lock, tuple(found.notes), digest=found.digest)
 
 
@@ -218,7 +227,7 @@ def _belongs(old: JournalContents, replayed: Replayed, found: _Found) -> bool:
 
 
 def _names(old: JournalContents, digest: str | None) -> bool:
-    return (old.base is not None and digest == old.file_digest) or digest in old.saved_revisions
+    return (old.first is not None and digest == old.file_digest) or digest in old.saved_revisions
 
 
 def _read_old_journal(beside: Path) -> tuple[JournalContents | None, list[str]]:

@@ -9,12 +9,14 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 from contact_core.document.document import ContactDocument
 from contact_core.document.schema import dump_document, same_documents
 from contact_core.edit import journal as journals
+from contact_core.edit import journal_file
 from contact_core.edit.commands import SetExtra
 from contact_core.edit.history import History
 from contact_core.edit.journal_file import encode_line, read_journal
@@ -309,3 +311,30 @@ def test_a_newer_journal_is_refused_and_left_untouched(tmp_path: Path) -> None:
 
 if __name__ == "__main__":
     kill_200_times(Path(sys.argv[1]))
+
+
+def test_opening_what_was_closed_in_order_costs_its_document_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The old journal's document is not decoded and the new one's is not encoded, and the new journal is whole."""
+    path = tmp_path / "d.json"
+    with Session.open(path) as session:
+        fill(session, 5)
+        session.save()
+        document = session.document
+    told: list[str] = []
+
+    def count(module: ModuleType, name: str) -> None:
+        real = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *arguments: (told.append(name), real(*arguments))[1])
+
+    count(journals, "document_to_json")
+    count(journals, "document_digest")
+    count(journal_file, "document_from_json")
+    session = Session.open(path)
+    assert told == [] and same_documents(session.document, document)
+    session.do(SetExtra("number", 1))
+    interrupt(session)
+    path.unlink()
+    replayed = replay(read_journal(journal_path(path))).history
+    assert same_documents(replayed.base, document) and replayed.document.extras["number"] == 1
