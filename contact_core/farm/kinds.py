@@ -85,7 +85,7 @@ class DocumentJob:
             check_finished(proposal.after.status.name)
             session.accept(proposal)
             with replacing_set(request.folder, names) as stage:
-                write_atomic(stage / names[0], dump_document(session.document))
+                write_atomic(stage / names[0], dump_document(session.timed_document))
                 write_atomic(stage / names[1], _poses_json(session))
                 picture = draw_solved(session, proposal, stage / THUMBNAIL)
                 written = tuple(name for name in names if (stage / name).exists())

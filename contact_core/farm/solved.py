@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,16 +33,18 @@ def outcome_of(
     proposal: Proposal,
     files: tuple[str, ...],
     *,
+    frames: Sequence[float] | None = None,
     picture: str | None = None,
     notes: tuple[str, ...] = (),
     inputs: tuple[Path, ...] = (),
 ) -> JobOutcome:
     """The outcome of a solve: the pair that is farthest from its partner, over all frames, says how good it is.
 
+    frames: those of the solutions, None for a solve of the scene as it stands.
     A pair fails where its points are on average farther apart than 2.5 % of the manipulator's length.
     """
     rows, failures, worst = [], [], 0.0
-    for solution, frame in zip(proposal.solutions, proposal.keys or [None], strict=False):
+    for frame, solution in zip_longest(frames or (), proposal.solutions):
         for name, share in gaps(solution).items():
             worst = max(worst, share / _LIMIT)
             label = name if frame is None else f"{name}, frame {frame:g}"

@@ -46,4 +46,6 @@ class ShotJob:
             picture = draw_solved(shot, proposal, request.folder / THUMBNAIL)
             files = (name, rebinding.KEPT, *([picture] if picture else []))
             inputs = tuple(map(Path, sorted(read)))
-            return outcome_of(proposal, files, picture=picture, notes=(*notes, *shot.notes), inputs=inputs)
+            return outcome_of(
+                proposal, files, frames=frames, picture=picture, notes=(*notes, *shot.notes), inputs=inputs
+            )

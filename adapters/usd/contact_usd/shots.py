@@ -84,7 +84,7 @@ def publish(session: Session, frames: Sequence[float] = ()) -> None:
         session.set_extra(key, dict(prims))
     contacts.publish(session.host, session, prims)
     for frame in frames:
-        document = session.binding.read(session.document.at(frame), frame)
+        document = session.binding.read(session.timed_document.at(frame), frame)
         contacts.key(session.host, document, geometry_of(session, document), frame)
 
 

@@ -321,7 +321,7 @@ def test_opening_what_was_closed_in_order_costs_its_document_once(
     with Session.open(path) as session:
         fill(session, 5)
         session.save()
-        document = session.document
+        document = session.timed_document
     told: list[str] = []
 
     def count(module: ModuleType, name: str) -> None:
@@ -332,7 +332,7 @@ def test_opening_what_was_closed_in_order_costs_its_document_once(
     count(journals, "document_digest")
     count(journal_file, "document_from_json")
     session = Session.open(path)
-    assert told == [] and same_documents(session.document, document)
+    assert told == [] and same_documents(session.timed_document, document)
     session.do(SetExtra("number", 1))
     interrupt(session)
     path.unlink()
