@@ -17,6 +17,10 @@ class NotManifold(InvalidInput):
     """The surface is not manifold where an operation needs it; names the face or vertex."""
 
 
+class Unreached(InvalidInput):
+    """A point that no path on the surface leads to; names it."""
+
+
 class FileRefused(ContactError):
     """A file that cannot be read or written: unknown format, damage, a newer schema, no room."""
 

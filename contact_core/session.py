@@ -85,6 +85,7 @@ class Session(ProposingSession):
         self._plugins: PluginManager | None = None if isinstance(plugins, Iterable) else plugins
         self._plugin_arguments = (tuple(plugins) if isinstance(plugins, Iterable) else (), discover)
         self.makers = PluginMakers(lambda: self.plugins)
+        self._derived.proxy_of = self.makers.named_proxy
         self.geometry = DocumentGeometry(lambda: self.document, self._derived, self.rigs)
         self.patches, self.pairs, self.sets = Patches(self), Pairs(self), ContactSets(self)
         self.surfaces, self.timeline = SceneSurfaces(self), Film(self)
@@ -177,10 +178,16 @@ class Session(ProposingSession):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what opening the file or the scene found."""
+        """Sentences on what opening the file or the scene found, and on surfaces whose contacts run on proxies."""
         own = self._file.notes if self._file is not None else ()
         missing = tuple(self._binding.missing.values()) if self._binding is not None else ()
-        return self._opening_notes + own + missing
+        proxied = tuple(
+            f"the contacts of {surface.name!r} run on a proxy, a closed surface near its mesh"
+            f" ({surface.proxy.maker or 'brought by hand'})."
+            for surface in self.document.surfaces.values()
+            if surface.proxy is not None
+        )
+        return self._opening_notes + own + missing + proxied
 
     @property
     def read_only(self) -> bool:

@@ -30,13 +30,13 @@ class Samples:
         sample = arguments.plugins.get(SAMPLES, arguments.sample)
         if arguments.out is None:
             raise InvalidInput(f"where to? Add --out FILE, such as --out {sample.name}.glb.")
-        writer = _writer(arguments.plugins, arguments.out)
+        writer = writer_of(arguments.plugins, arguments.out)
         writer.write(arguments.out, [sample.build()], {})
         arguments.output.answer({"written": str(arguments.out)}, f"wrote {arguments.out}")
         return 0
 
 
-def _writer(plugins: PluginManager, path: Path) -> Format:
+def writer_of(plugins: PluginManager, path: Path) -> Format:
     """The format that writes files with this ending."""
     writers = [offered for offered in plugins.offers(FORMATS).values() if offered.can_write]
     for offered in writers:

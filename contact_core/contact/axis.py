@@ -14,7 +14,7 @@ import numpy as np
 from contact_core.arrays import ComplexArray, FloatArray, IntArray, frozen
 from contact_core.contact.placement import Root
 from contact_core.contact.shape import AxisShape
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, Unreached
 from contact_core.geometry.exact_geodesics import LogMap, log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
@@ -73,7 +73,7 @@ def draw_axis(
     for k in range(1, len(picks)):
         leg = log_map(mesh, start, picks[k])
         if leg.anchor[0] < 0:
-            raise InvalidInput(f"axis points {k - 1} and {k} lie on parts of the surface that are not connected.")
+            raise Unreached(f"axis points {k - 1} and {k} lie on parts of the surface that are not connected.")
         if leg.distance[0] <= 1e-12 * mesh.bounding_box_diagonal:
             continue
         leaving = complex(leg.first_leg[0]) / abs(complex(leg.first_leg[0]))

@@ -15,7 +15,7 @@ from contact_core.arrays import BoolArray, ComplexArray, FloatArray, IntArray, f
 from contact_core.contact.axis import Axis, reconstruct_axis
 from contact_core.contact.placement import Root
 from contact_core.contact.shape import AxisShape, PatchCoordinates, PatchShape
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, Unreached
 from contact_core.geometry.engine import EXACT, ChainedLogMapResult, GeodesicEngine, LogMapResult
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
@@ -207,7 +207,7 @@ def _reordered(coordinates: PatchCoordinates, order: IntArray) -> PatchCoordinat
 
 def _check_reached(anchors: IntArray) -> None:
     if len(anchors) and anchors.min() < 0:
-        raise InvalidInput(
+        raise Unreached(
             f"patch point {int(np.argmin(anchors))} lies on a part of the surface that the axis does not reach."
             " Split the patch by surface and keep the parts as a group."
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contact_core.contact.placement import Root
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, Unreached
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
@@ -21,7 +21,7 @@ def transported(mesh: TriangleMesh, root: Root, to: SurfacePoints) -> Root:
         raise InvalidInput(f"a patch is moved to one surface point, but got {len(to)}.")
     log = log_map(mesh, root.point(), to)
     if log.anchor[0] < 0:
-        raise InvalidInput("no path on the surface leads from the patch to that point; transfer it instead.")
+        raise Unreached("no path on the surface leads from the patch to that point; transfer it instead.")
     if log.distance[0] == 0.0:
         return root
     leaving = complex(log.first_leg[0]) / abs(complex(log.first_leg[0]))

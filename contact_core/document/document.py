@@ -27,11 +27,30 @@ MAX_NAME = 200
 
 
 @dataclass(frozen=True, eq=False)
+class Proxy:
+    """The closed manifold surface that the contacts of a surface run on, where its own mesh is broken.
+
+    maker: the name of the proxy maker (hook `contact_proxy_makers`), with its settings: they make the same mesh
+    elsewhere; "" for a mesh that was brought. digest: of the TriangleMesh. faces: how many it has.
+    """
+
+    maker: str
+    settings: FrozenMap[Any]
+    digest: str
+    faces: int
+
+    def __post_init__(self) -> None:
+        if self.faces < 1:
+            raise InvalidInput(f"a proxy has faces, but {self.faces} came.")
+
+
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A surface as the document remembers it: enough to recognise it, not to draw it.
 
     digest, topology_digest: of its TriangleMesh. world_from_surface: (4, 4) rigid; where the object, or the rig's
-    own space, stands in the scene. rig: name of the rig whose rest pose this is, None for an object.
+    own space, stands in the scene. rig: name of the rig whose rest pose this is, None for an object. proxy: what
+    contacts run on in place of the mesh: roots are on the proxy's faces, points are given on the surface's own.
     """
 
     name: str
@@ -43,6 +62,7 @@ class Surface:
     up_axis: Literal["X", "Y", "Z"] = "Y"
     rig: str | None = None
     world_from_surface: FloatArray = field(default_factory=lambda: np.eye(4))
+    proxy: Proxy | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "a surface")
@@ -56,6 +76,16 @@ class Surface:
             raise InvalidInput(f"meters_per_unit is a positive number, but got {self.meters_per_unit}.")
         if min(self.points, self.faces) < 0:
             raise InvalidInput(f"{self.name!r} cannot have {self.points} points and {self.faces} faces.")
+
+    @property
+    def carrier_digest(self) -> str:
+        """Of the mesh that contacts run on: its proxy's, where it has one."""
+        return self.digest if self.proxy is None else self.proxy.digest
+
+    @property
+    def carrier_faces(self) -> int:
+        """How many faces the mesh has that contacts run on."""
+        return self.faces if self.proxy is None else self.proxy.faces
 
 
 @dataclass(frozen=True, slots=True)

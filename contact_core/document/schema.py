@@ -206,8 +206,8 @@ def _patch_inconsistencies(document: ContactDocument, patch: Patch) -> Iterator[
         yield f"patch {patch.name!r} has the shape {patch.shape!r}, which does not exist."
     place = patch.placement
     if not isinstance(place, Link):
-        if surface is not None and place.face >= surface.faces:
-            yield f"patch {patch.name!r} is rooted in face {place.face} of {surface.faces}."
+        if surface is not None and place.face >= surface.carrier_faces:
+            yield f"patch {patch.name!r} is rooted in face {place.face} of {surface.carrier_faces}."
         return
     parent = document.patches.get(place.parent)
     if parent is None:

@@ -56,10 +56,10 @@ def _placement_inconsistencies(document: ContactDocument, name: str, track: Trac
             " own place: unlink it, or clear its keys, first."
         )
     for key in track.of(PlacementKey):
-        if surface is not None and key.root.face >= surface.faces:
+        if surface is not None and key.root.face >= surface.carrier_faces:
             yield (
-                f"patch {name!r} is rooted in face {key.root.face} of {surface.faces} at frame {key.frame:g}: its"
-                " keys belong to another mesh."
+                f"patch {name!r} is rooted in face {key.root.face} of {surface.carrier_faces} at frame"
+                f" {key.frame:g}: its keys belong to another mesh."
             )
             return
 

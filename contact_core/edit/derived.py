@@ -15,10 +15,12 @@ from contact_core.contact.axis import Axis, reconstruct_axis, root_from_point
 from contact_core.contact.linkage import follow_link, follow_walk
 from contact_core.contact.patch import PatchPoints, points_from_axis
 from contact_core.contact.placement import Link, Root, Walk
-from contact_core.document.document import ContactDocument
+from contact_core.document.document import ContactDocument, Surface
 from contact_core.errors import InvalidInput
 from contact_core.geometry.engine import EXACT, GeodesicEngine
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_map import SurfaceMap
+from contact_core.geometry.surface_point import SurfacePoints
 
 MOST_POINTS = 1_000_000  # about 60 MB
 T = TypeVar("T")
@@ -27,9 +29,13 @@ T = TypeVar("T")
 class Derived:
     """Roots, axes and points of patches on the meshes of a session.
 
+    Contacts run on the mesh of their surface, or on its proxy where it has one (`carrier`): roots, axes and patches
+    are there. `points` and `axis_points` are on the surface's own mesh, which people see.
+
     computed: how many axes and point sets were traced so far; tests guard the cost by counting. engine: measures
     the coordinates of points on their patches; what is reconstructed here is walked by the exact tracer alone.
-    known_meshes: by content digest, those of earlier revisions among them.
+    known_meshes: by content digest, those of earlier revisions among them. proxy_of: makes the proxy that the
+    record of a surface names, of its mesh, where that proxy is not known.
     """
 
     def __init__(
@@ -37,13 +43,16 @@ class Derived:
     ) -> None:
         self.engine = engine
         self.known_meshes = dict(known_meshes or {})  # after a rebind, undo finds the old one
+        self.proxy_of: Callable[[Surface, TriangleMesh], TriangleMesh] = _no_proxy
         self._kept: OrderedDict[Hashable, tuple[object, int]] = OrderedDict()
         self._points = 0
         self.computed = 0
 
     def apart(self) -> Derived:
         """The same meshes and engine with a cache of its own, for another thread."""
-        return Derived(self.engine, self.known_meshes)
+        found = Derived(self.engine, self.known_meshes)
+        found.proxy_of = self.proxy_of
+        return found
 
     def bring(self, mesh: TriangleMesh) -> None:
         """Know a mesh from now on, for every surface of every document that has its content."""
@@ -63,6 +72,39 @@ class Derived:
                 f"the mesh of {surface!r} is not loaded: give it to the session by surfaces.add({surface!r}, mesh)."
             ) from None
 
+    def carrier(self, document: ContactDocument, surface: str) -> TriangleMesh:
+        """The mesh that the contacts of a surface run on: its proxy, where it has one. Raises InvalidInput."""
+        record, mesh = document.surface(surface), self.mesh(document, surface)
+        if record.proxy is None:
+            return mesh
+        if record.proxy.digest not in self.known_meshes:
+            self.known_meshes[record.proxy.digest] = self.proxy_of(record, mesh)
+        return self.known_meshes[record.proxy.digest]
+
+    def map(self, document: ContactDocument, surface: str) -> SurfaceMap | None:
+        """The map between a surface and its proxy, None where it has none."""
+        if document.surface(surface).proxy is None:
+            return None
+        return SurfaceMap.of(self.mesh(document, surface), self.carrier(document, surface))
+
+    def seen(self, document: ContactDocument, surface: str, points: SurfacePoints) -> SurfacePoints:
+        """Points of the carrier on the surface's own."""
+        found = self.map(document, surface)
+        return points if found is None else found.to_source(points)
+
+    def points(self, document: ContactDocument, name: str) -> SurfacePoints:
+        """The points of a patch on its surface's own mesh."""
+        surface, carried = document.patch(name).surface, self.patch(document, name).points
+        if document.surface(surface).proxy is None:
+            return carried
+        coordinates = document.shape_of(name).coordinates.digest
+        key = ("seen", document.surface(surface).digest, self._axis_key(document, name), coordinates)
+        return self._cached(key, len(carried), lambda: self.seen(document, surface, carried))
+
+    def axis_points(self, document: ContactDocument, name: str) -> SurfacePoints:
+        """The points of the axis of a patch on its surface's own mesh."""
+        return self.seen(document, document.patch(name).surface, self.axis(document, name).points)
+
     def unit(self, document: ContactDocument, name: str) -> float:
         """Surface units of a patch's surface per unit of its shape."""
         patch = document.patch(name)
@@ -78,7 +120,7 @@ class Derived:
         return self._cached(("walk", digest, walk), 1, lambda: follow_walk(mesh, walk))
 
     def axis(self, document: ContactDocument, name: str) -> Axis:
-        """The axis of a patch on its surface."""
+        """The axis of a patch on the mesh that contacts of its surface run on."""
         self._trace_ancestors(document, name)
         return self._axis(document, name)
 
@@ -99,14 +141,14 @@ class Derived:
         def trace() -> Axis:
             self.computed += 1
             root, cut = self._root_and_cut(document, name)
-            mesh, unit = self.mesh(document, patch.surface), self.unit(document, name)
+            mesh, unit = self.carrier(document, patch.surface), self.unit(document, name)
             axis = reconstruct_axis(mesh, shape, root, mirrored=patch.mirrored, unit=unit)
             return axis if cut == 0.0 else replace(axis, remaining=axis.remaining + cut)
 
         return self._cached(("axis", self._axis_key(document, name)), shape.point_count, trace)
 
     def patch(self, document: ContactDocument, name: str) -> PatchPoints:
-        """The points of a patch on its surface."""
+        """A patch on the mesh that contacts of its surface run on."""
         patch = document.patch(name)
         coordinates = document.shapes[patch.shape].coordinates
 
@@ -114,7 +156,7 @@ class Derived:
             axis = self.axis(document, name)
             self.computed += 1
             return points_from_axis(
-                self.mesh(document, patch.surface),
+                self.carrier(document, patch.surface),
                 coordinates,
                 axis,
                 document.effective_axis(name),
@@ -134,14 +176,14 @@ class Derived:
         if isinstance(link, Root):
             return link, 0.0
         if isinstance(link, Walk):
-            walk, mesh = link, self.mesh(document, document.patch(name).surface)
-            return self.walked(mesh, document.surface(document.patch(name).surface).digest, walk), 0.0
+            carrier = self.carrier(document, document.patch(name).surface)
+            return self.walked(carrier, document.surface(document.patch(name).surface).carrier_digest, link), 0.0
         key = ("root", self._axis_key(document, link.parent), link, self._shape_key(document, name))
         return self._cached(key, 1, lambda: self._linked_root(document, name, link))
 
     def _linked_root(self, document: ContactDocument, name: str, link: Link) -> tuple[Root, float]:
         patch = document.patch(name)
-        mesh, parent = self.mesh(document, patch.surface), self._axis(document, link.parent)
+        mesh, parent = self.carrier(document, patch.surface), self._axis(document, link.parent)
         point, tangent, cut = follow_link(mesh, parent, link)
         root, cut_off = root_from_point(
             mesh,
@@ -165,7 +207,7 @@ class Derived:
         shape = document.shapes[patch.shape]
         unit = shape.meters_per_unit / surface.meters_per_unit
         own = (patch.turns, patch.along, patch.spread)
-        return surface.digest, shape.axis.digest, own, patch.mirrored, unit
+        return surface.carrier_digest, shape.axis.digest, own, patch.mirrored, unit
 
     def _cached(self, key: Hashable, size: int, make: Callable[[], T]) -> T:
         kept = self._kept.get(key)
@@ -178,3 +220,7 @@ class Derived:
         while self._points > MOST_POINTS and len(self._kept) > 1:
             self._points -= self._kept.popitem(last=False)[1][1]
         return value
+
+
+def _no_proxy(surface: Surface, mesh: TriangleMesh) -> TriangleMesh:
+    raise InvalidInput(f"the proxy of {surface.name!r} is made by a session with its plugins, not here.")

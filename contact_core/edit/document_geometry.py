@@ -22,7 +22,7 @@ from contact_core.edit.derived import Derived
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.geometry.tangent import direction_to_heading
+from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.rig.bones import bones_of
 from contact_core.rig.rig import Rig, forward_kinematics, skin
 
@@ -103,18 +103,35 @@ class DocumentGeometry:
     def root_at(
         self, surface: str, point: SurfacePoints, heading: complex | None = None, direction: Any = None
     ) -> Root:
-        """A root from one surface point and either a heading or a direction in surface space (3,)."""
+        """A root from one point of a surface and either a heading there or a direction in surface space (3,)."""
         if (heading is None) == (direction is None):
             raise InvalidInput("a root needs either a heading or a direction in space.")
-        self.check_points(surface, point)
-        if heading is None:
-            wanted = frozen(direction, np.float64, (3,), "a direction in space")[None]
-            heading = complex(direction_to_heading(self.mesh(surface), point, wanted)[0])
-        return Root.at(point, heading)
+        carried = self.on_carrier(surface, point)
+        if heading is not None and carried is point:
+            return Root.at(point, heading)
+        if heading is not None:
+            direction = heading_to_direction(self.mesh(surface), point, np.array([heading]))[0]
+        wanted = frozen(direction, np.float64, (3,), "a direction in space")[None]
+        return Root.at(carried, complex(direction_to_heading(self.carrier(surface), carried, wanted)[0]))
 
-    def check_points(self, surface: str, points: SurfacePoints) -> None:
-        """There are points, and all of them lie on the mesh of a surface. Raises InvalidInput."""
-        count = len(self.mesh(surface).faces)
+    def carrier(self, surface: str) -> TriangleMesh:
+        """The mesh that the contacts of a surface run on: its proxy where it has one, else its own."""
+        return self._derived.carrier(self.document, surface)
+
+    def on_carrier(self, surface: str, points: SurfacePoints) -> SurfacePoints:
+        """Points of a surface, checked, on the mesh that its contacts run on. Raises InvalidInput."""
+        self.check_points(surface, points)
+        found = self._derived.map(self.document, surface)
+        return points if found is None else found.to_proxy(points)
+
+    def seen(self, surface: str, carried: SurfacePoints) -> SurfacePoints:
+        """Points of the mesh that contacts run on, on the surface's own."""
+        return self._derived.seen(self.document, surface, carried)
+
+    def check_points(self, surface: str, points: SurfacePoints, *, on_carrier: bool = False) -> None:
+        """There are points, and all of them lie on the mesh of a surface, or on the one that its contacts run on.
+        Raises InvalidInput."""
+        count = len((self.carrier(surface) if on_carrier else self.mesh(surface)).faces)
         if not len(points):
             raise InvalidInput(f"expected a surface point or several on {surface!r}, but got none.")
         outside = (points.faces < 0) | (points.faces >= count)  # (k,)
@@ -123,15 +140,18 @@ class DocumentGeometry:
             raise InvalidInput(f"{surface!r} has the faces 0..{count - 1}, but got a point in face {bad}.")
 
     def axis_request(self, surface: str, patch: str, points: SurfacePoints) -> AxisRequest:
-        """What an axis generator gets for a patch: bones of the rig, and the axes drawn on the surface so far."""
+        """What an axis generator gets for a patch: bones of the rig, and the axes drawn on the surface so far.
+
+        points, and all points in the request: on the mesh that contacts of the surface run on (`carrier`).
+        """
         others = {
             other.name: self.axis(other.name).points
             for other in self.document.patches.values()
             if other.surface == surface and other.name != patch and other.original
         }
         rig = self._rigs.get(surface)
-        bones, owner = bones_of(rig, points) if rig is not None else (None, None)
-        return AxisRequest(self.mesh(surface), points, bones, owner, others)
+        bones, owner = bones_of(rig, self.seen(surface, points)) if rig is not None else (None, None)
+        return AxisRequest(self.carrier(surface), points, bones, owner, others)
 
     # -- patches -------------------------------------------------------------------------------------------------
 
@@ -139,12 +159,20 @@ class DocumentGeometry:
         """The mesh that a patch lies on."""
         return self.mesh(self.document.patch(patch).surface)
 
+    def carrier_of(self, patch: str) -> TriangleMesh:
+        """The mesh that a patch runs on: that of its root, its axis and its reconstruction."""
+        return self.carrier(self.document.patch(patch).surface)
+
     def axis(self, patch: str) -> Axis:
-        """The axis of a patch where it is now."""
+        """The axis of a patch where it is now, on the mesh that it runs on (`carrier_of`)."""
         return self._derived.axis(self.document, patch)
 
+    def axis_points(self, patch: str) -> SurfacePoints:
+        """The points of the axis of a patch on the mesh that it lies on (`mesh_of`)."""
+        return self._derived.axis_points(self.document, patch)
+
     def root(self, patch: str) -> Root:
-        """Where the axis of a patch starts now, whether it is the child of another or not."""
+        """Where the axis of a patch starts now, whether it is the child of another or not; on `carrier_of`."""
         return self._derived.root(self.document, patch)
 
     def unit(self, patch: str) -> float:
@@ -152,12 +180,12 @@ class DocumentGeometry:
         return self._derived.unit(self.document, patch)
 
     def reconstruction(self, patch: str) -> PatchPoints:
-        """The points of a patch where they are now, with what ran off a boundary."""
+        """A patch where it is now, with what ran off a boundary; on the mesh that it runs on (`carrier_of`)."""
         return self._derived.patch(self.document, patch)
 
     def points(self, patch: str) -> SurfacePoints:
-        """The points of a patch where they are now."""
-        return self.reconstruction(patch).points
+        """The points of a patch where they are now, on the mesh that it lies on (`mesh_of`)."""
+        return self._derived.points(self.document, patch)
 
     def area(self, patch: str) -> PatchArea:
         """The patch triangulated: area on its surface, boundary loops."""
@@ -195,6 +223,7 @@ class DocumentGeometry:
         pair = named(self.document.pairs, name, "pair")
         ends = [self.document.patch(end) for end in (pair.manipulator, pair.object)]
         here, there = (self.reconstruction(end.name) for end in ends)
+        points, points_there = (self.points(end.name) for end in ends)
         shape = self.document.shapes[ends[0].shape]
         other = np.arange(len(shape))
         if ends[0].shape != ends[1].shape:
@@ -202,5 +231,5 @@ class DocumentGeometry:
         fits = ~(here.ran_off | there.ran_off[other])  # (k,)
         weights = shape.weights * shape.meters_per_unit**2 * pair.weight * fits
         return PairGeometry(
-            pair, ends[0].surface, ends[1].surface, here.points, there.points[other], weights
+            pair, ends[0].surface, ends[1].surface, points, points_there[other], weights
         )  # fmt: skip

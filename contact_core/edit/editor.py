@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from contact_core.contact.axis_generator import AxisGenerator
-from contact_core.document.document import ContactDocument
+from contact_core.document.document import ContactDocument, Proxy
 from contact_core.edit.command import Command
 from contact_core.edit.derived import Derived
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.rig import Rig
 
 if TYPE_CHECKING:
@@ -18,8 +21,13 @@ if TYPE_CHECKING:
 
 
 class Makers:
-    """Makes what verbs are given by name, or not at all: brushes, and axes. This one knows no names; a session's
-    asks its plugins."""
+    """Makes what verbs are given by name, or not at all: brushes, axes, proxies. This one knows no names; that of a
+    session asks its plugins.
+
+    mends: whether a verb that fails because a surface is broken gives it a proxy and works on that, in one step.
+    """
+
+    mends: bool = False
 
     def brush(self, name: str, **settings: Any) -> Brush:
         """A brush by name, with its settings. Raises InvalidInput."""
@@ -37,6 +45,17 @@ class Makers:
         raise InvalidInput(
             f"the patch {patch!r} needs an axis: pass `axis` with one point and a heading, or with more points."
         )
+
+    def proxy(
+        self,
+        mesh: TriangleMesh,
+        maker: str | None = None,
+        settings: Mapping[str, Any] | None = None,
+        progress: Progress = NO_PROGRESS,
+    ) -> tuple[Proxy, TriangleMesh]:
+        """A closed manifold near a mesh, and how a document names it. Raises InvalidInput, MissingExtra,
+        Cancelled."""
+        raise InvalidInput("only a session makes proxies: bring one as a mesh.")
 
 
 class Editor(Protocol):

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from contact_core.contact.axis_generator import AxisGenerator
 from contact_core.contact.brush import Brush
-from contact_core.document.document import ContactDocument
+from contact_core.document.document import ContactDocument, Proxy
 from contact_core.edit.command import Command, apply_command
 from contact_core.edit.derived import Derived
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.edit.editor import Editor, Makers
 from contact_core.edit.verbs import Pairs, Patches, Surfaces
 from contact_core.errors import CommandRejected
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.progress import NO_PROGRESS, Progress
 
 
 class Stroke:
@@ -90,6 +92,7 @@ class KeptBrushes(Makers):
 
     def __init__(self, makers: Makers) -> None:
         self._makers = makers
+        self.mends = makers.mends
         self._brushes: dict[str, Brush] = {}
 
     def brush(self, name: str, **settings: Any) -> Brush:
@@ -109,3 +112,13 @@ class KeptBrushes(Makers):
     ) -> SurfacePoints:
         """Axis points, as the makers behind have them."""
         return self._makers.axis(geometry, surface, patch, points, generator)
+
+    def proxy(
+        self,
+        mesh: TriangleMesh,
+        maker: str | None = None,
+        settings: Mapping[str, Any] | None = None,
+        progress: Progress = NO_PROGRESS,
+    ) -> tuple[Proxy, TriangleMesh]:
+        """A proxy, as the makers behind have it."""
+        return self._makers.proxy(mesh, maker, settings, progress)

@@ -130,3 +130,15 @@ class Topology:
             f"{doing} needs a manifold surface, but the faces round vertex {int(vertex)} do not form a single fan. "
             f"Split that vertex, or stay away from it."
         )
+
+
+def closed_manifold(mesh: TriangleMesh, name: str) -> TriangleMesh:
+    """The mesh itself, if it is a closed manifold, as a proxy has to be. Raises InvalidInput. name: of what for."""
+    topology = Topology.of(mesh)
+    if not len(mesh.faces) or not topology.is_manifold or len(topology.boundary_halfedges):
+        raise InvalidInput(
+            f"a proxy is a closed manifold, but that for {name!r} has {len(mesh.faces)} faces,"
+            f" {len(topology.boundary_halfedges)} open edges and is {'a' if topology.is_manifold else 'no'}"
+            " manifold."
+        )
+    return mesh

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.contact.patch import PatchPoints
 from contact_core.document.document import ContactDocument, Patch
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.interaction.overlay import WHITE, AxisLine, Decal, Label, Overlay, PairLine
@@ -37,18 +36,19 @@ class DocumentDrawing:
             seen = scene.surfaces.get(patch.surface)
             if seen is None:
                 continue
-            where, chosen = shown.reconstruction(patch.name), patch.name in selection.patches
+            where, chosen = shown.points(patch.name), patch.name in selection.patches
             decals.append(self._decal(document, patch, seen, where, chosen))
             if chosen:
-                line = lifted(seen, where.axis.points)
+                along = shown.axis_points(patch.name)
+                line = lifted(seen, along)
                 axes.append(AxisLine(line, WHITE, patch=patch.name, arrow=True))
             if chosen and desk.settings.labels:
-                labels.append(Label(patch.name, seen.positions(where.axis.points[0])[0], patch.color))
+                labels.append(Label(patch.name, seen.positions(shown.axis_points(patch.name)[0])[0], patch.color))
         self._decals = {name: kept for name, kept in self._decals.items() if name in document.patches}
         return Overlay(tuple(decals), tuple(axes), pair_lines=self._pairs(document), labels=tuple(labels))
 
     def _decal(
-        self, document: ContactDocument, patch: Patch, seen: SeenSurface, where: PatchPoints, chosen: bool
+        self, document: ContactDocument, patch: Patch, seen: SeenSurface, where: SurfacePoints, chosen: bool
     ) -> Decal:
         made_of: tuple[object, ...] = (where, seen, patch.color, chosen)
         kept = self._decals.get(patch.name)
@@ -58,7 +58,7 @@ class DocumentDrawing:
         key = shape.coordinates.digest
         if key not in self._triangles:
             self._triangles[key] = self._desk.shown.area(patch.name).triangles
-        points = lifted(seen, where.points)
+        points = lifted(seen, where)
         decal = Decal(patch.name, patch.surface, points, self._triangles[key], patch.color, chosen)
         self._decals[patch.name] = made_of, decal
         return decal
@@ -69,8 +69,8 @@ class DocumentDrawing:
             ends = document.patch(pair.manipulator), document.patch(pair.object)
             if any(end.surface not in scene.surfaces for end in ends):
                 continue
-            where = [shown.reconstruction(end.name) for end in ends]
-            both = [scene.surfaces[end.surface].positions(w.points) for end, w in zip(ends, where, strict=True)]
+            where = [shown.points(end.name) for end in ends]
+            both = [scene.surfaces[end.surface].positions(w) for end, w in zip(ends, where, strict=True)]
             middle = np.stack([points.mean(axis=0) for points in both])
             shared = ends[0].shape == ends[1].shape
             some = np.linspace(0, len(both[0]) - 1, min(_AS_MANY, len(both[0]))).astype(int)

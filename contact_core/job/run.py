@@ -140,7 +140,7 @@ def place_from(
         object_mesh=job.object.mesh,
         object_from_rig=np.asarray(np.linalg.inv(job.placed)),
         patch_points={name: job.session.geometry.points(name) for name in names},
-        patch_axes={name: job.session.geometry.axis(name).points for name in names},
+        patch_axes={name: job.session.geometry.axis_points(name) for name in names},
         solids=job.solids,
     )
     return plugins.make(PLACERS, plugins.name_for(PLACERS, "recipe", placer), **options).place(request)

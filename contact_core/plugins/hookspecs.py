@@ -1,6 +1,6 @@
 """Every hook of contact-core, on one screen. Mark an implementation with `contact_core.plugins.hookimpl`.
 
-The first thirteen return what a plugin offers: an iterable of objects that satisfy the slot's protocol, or of
+The first fourteen return what a plugin offers: an iterable of objects that satisfy the slot's protocol, or of
 references "package.module:Name" to them, imported when first wanted (a class is then called without arguments),
 so that offering costs nothing and a missing library takes away one object, not a plugin.
 """
@@ -63,6 +63,9 @@ def contact_commands() -> Offers:
 @hookspec
 def contact_job_kinds() -> Offers:
     """Kinds of jobs for `contact batch`: `plugins.slots.JobKind`."""
+@hookspec
+def contact_proxy_makers() -> Offers:
+    """Makers of closed manifolds that stand for broken meshes: `plugins.slots.ProxyMaker`."""
 @hookspec
 def contact_cli() -> Offers:
     """Sub-commands of `contact`: `plugins.slots.CliCommand`."""

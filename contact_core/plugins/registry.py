@@ -17,7 +17,15 @@ if TYPE_CHECKING:
     from contact_core.edit.command import Command
     from contact_core.geometry.engine import GeodesicEngine
     from contact_core.interaction.tool import Tool
-    from contact_core.plugins.slots import CliCommand, Format, JobKind, Placer, Renderer, Sample
+    from contact_core.plugins.slots import (
+        CliCommand,
+        Format,
+        JobKind,
+        Placer,
+        ProxyMaker,
+        Renderer,
+        Sample,
+    )  # fmt: skip
     from contact_core.scene.host import HostAdapter
     from contact_core.solve.solver import PoseSolver
     from contact_core.solve.terms import PoseTerm
@@ -80,6 +88,10 @@ COMMANDS: Slot[type[Command]] = Slot(
 JOB_KINDS: Slot[JobKind] = Slot(
     "contact_job_kinds", "kind of job", "contact_core.plugins.slots:JobKind", core="contact_core.farm.kinds:OWN"
 )
+PROXY_MAKERS: Slot[ProxyMaker] = Slot(
+    "contact_proxy_makers", "proxy maker", "contact_core.plugins.slots:ProxyMaker",
+    roles=("repair",), first_is="repair",
+)  # fmt: skip
 CLI: Slot[CliCommand] = Slot("contact_cli", "sub-command", "contact_core.plugins.slots:CliCommand")
 
 SLOTS: tuple[Slot[Any], ...] = (
@@ -96,6 +108,7 @@ SLOTS: tuple[Slot[Any], ...] = (
     SAMPLES,
     COMMANDS,
     JOB_KINDS,
+    PROXY_MAKERS,
     CLI,
 )
 

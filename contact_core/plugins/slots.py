@@ -1,4 +1,5 @@
-"""The plugin slots that belong to no lower floor: formats, samples, renderers, placers, jobs, sub-commands.
+"""The plugin slots that belong to no lower floor: formats, samples, renderers, placers, jobs, proxy makers,
+sub-commands.
 
 The protocols of the other slots live with what they serve: `contact.brush.Brush`,
 `contact.axis_generator.AxisGenerator`, `solve.terms.PoseTerm`, `solve.solver.PoseSolver`,
@@ -179,6 +180,27 @@ class JobKind(Protocol):
         """Do the job and place its results in the folder: all of them or none; the same again gives the same.
 
         Raises ContactError in a sentence, Cancelled where progress raises it.
+        """
+        ...
+
+
+@runtime_checkable
+class ProxyMaker(Protocol):
+    """Makes the closed manifold surface that contacts run on where a mesh is broken (hook `contact_proxy_makers`).
+
+    Settings of its own are fields, see `contact_core.settings`; documents keep them.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def summary(self) -> str: ...
+
+    def make(self, mesh: TriangleMesh, progress: Progress) -> TriangleMesh:
+        """A closed manifold near a mesh, in its units; equal meshes and settings give equal proxies.
+
+        Raises InvalidInput, MissingExtra, Cancelled.
         """
         ...
 

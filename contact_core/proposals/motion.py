@@ -185,7 +185,7 @@ class _Motion:
         ):
             sliding = self._sliding(draft, patch)
             if sliding is not None:
-                points = sliding.points(frame)
+                points = draft.derived.seen(self.timed, self.timed.patch(patch).surface, sliding.points(frame))
                 changes[side] = points if order is None else points[order]
         return replace(contact, **changes) if changes else contact
 
@@ -211,7 +211,7 @@ class _Motion:
                 patch.mirrored,
                 draft.derived.unit(document, name),
             )
-            mesh = draft.derived.mesh(document, patch.surface)
+            mesh = draft.derived.carrier(document, patch.surface)
             kept[name] = SlidingPatch(mesh, shaped, PlacementKeys(track.of(PlacementKey)))
         found: SlidingPatch = kept[name]
         return found

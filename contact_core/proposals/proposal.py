@@ -188,12 +188,14 @@ def _raise_if_cancelled(solution: PoseSolution) -> None:
         raise Cancelled("it was cancelled; nothing is proposed.")
 
 
-def _bends(draft: Draft, contact: str) -> str:
+def _bends(draft: Draft, contact: str, *, sliding: bool = False) -> str:
     """Why a contact cannot move on its object, empty where it can."""
     pair = draft.document.pairs[contact]
     surfaces = [draft.document.patch(end).surface for end in (pair.manipulator, pair.object)]
     if surfaces[1] in draft.rigs:
         return f"{surfaces[1]} bends, and contacts only move on surfaces that stay as they are"
+    if sliding and draft.document.surface(surfaces[1]).proxy is not None:
+        return f"the contacts of {surfaces[1]} run on a proxy, and only settling moves those"
     return "" if surfaces[0] in draft.rigs else f"{surfaces[0]} has no rig that is posed"
 
 
@@ -214,7 +216,7 @@ def _place_all(draft: Draft, plugins: PluginManager, reach: float, solids: Solid
             object_mesh=draft.geometry.mesh(thing),
             object_from_rig=np.asarray(np.linalg.inv(world[thing]) @ world[hand]),
             patch_points={name: draft.geometry.points(pair.manipulator) for name, pair in pairs.items()},
-            patch_axes={name: draft.geometry.axis(pair.manipulator).points for name, pair in pairs.items()},
+            patch_axes={name: draft.geometry.axis_points(pair.manipulator) for name, pair in pairs.items()},
             reach=reach,
             solids=tuple(solids.get(thing, ())),
         )
@@ -230,7 +232,7 @@ def _sliding_patches(
 ) -> tuple[list[SlidingPatch], dict[str, str]]:
     document, patches, left_out = draft.document, [], {}
     for contact, pair in document.pairs.items():
-        patch, reason = document.patch(pair.object), _bends(draft, contact)
+        patch, reason = document.patch(pair.object), _bends(draft, contact, sliding=True)
         if not reason and patch.shape != document.patch(pair.manipulator).shape:
             reason = "its two patches were painted apart, and share no shape"
         if reason:

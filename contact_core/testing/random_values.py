@@ -10,7 +10,8 @@ import numpy as np
 from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Link, Placement, Root
 from contact_core.contact.shape import AxisShape, PatchCoordinates, PatchShape
-from contact_core.document.document import ContactDocument, Patch, Surface
+from contact_core.document.document import ContactDocument, Patch, Proxy, Surface
+from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.timeline import Key, PlaceKey, PoseKey, Track, WeightKey
 from contact_core.motion.placement_keys import PlacementKey, Way
 from contact_core.rig.rig import Pose
@@ -39,7 +40,7 @@ def random_coordinates(rng: Rng, n: int, axis_points: int) -> PatchCoordinates:
 def random_root(rng: Rng, surface: Surface) -> Root:
     """A root somewhere on a surface."""
     a, b, c = rng.dirichlet(np.ones(3)).tolist()
-    return Root(int(rng.integers(surface.faces)), (a, b, c), complex(np.exp(1j * rng.uniform(-3.0, 3.0))))
+    return Root(int(rng.integers(surface.carrier_faces)), (a, b, c), complex(np.exp(1j * rng.uniform(-3.0, 3.0))))
 
 
 def random_link(rng: Rng, document: ContactDocument, parent: str, child: Patch) -> Link:
@@ -74,10 +75,13 @@ def pick_surface(document: ContactDocument, rng: Rng) -> Surface | None:
 
 
 def new_surface(rng: Rng, name: str) -> Surface:
-    """A surface of some size and unit, most with a rig."""
+    """A surface of some size and unit, most with a rig, some with a proxy."""
     rig = str(pick(rng, ["hand", "tentacle"])) if rng.random() < 0.7 else None
     unit = float(pick(rng, [1.0, 0.01]))
-    return Surface(name, f"{rng.integers(1 << 30):x}", "topology", 50, int(rng.integers(5, 90)), unit, rig=rig)
+    number = int(rng.integers(1 << 30))
+    settings: FrozenMap[Any] = FrozenMap({"offset": 0.01 * (number % 7 + 1), "cell": None, "fill": number % 2 == 0})
+    proxy = Proxy("level_set", settings, f"{number + 1:x}", number % 60 + 5) if number % 5 == 0 else None
+    return Surface(name, f"{number:x}", "topology", 50, int(rng.integers(5, 90)), unit, rig=rig, proxy=proxy)
 
 
 def new_patch(document: ContactDocument, rng: Rng, name: str, surface: Surface) -> Patch:

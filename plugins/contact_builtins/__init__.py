@@ -135,9 +135,15 @@ def contact_samples() -> list[object]:
 
 
 @hookimpl
+def contact_proxy_makers() -> list[object]:
+    return ["contact_builtins.proxies.level_set:LevelSetProxy"]
+
+
+@hookimpl
 def contact_cli() -> list[object]:
     return [
         "contact_builtins.cli.inspect:Inspect",
+        "contact_builtins.cli.repair:Repair",
         "contact_builtins.cli.demo:Demo",
         "contact_gallery.command:GalleryCommand",
     ]

@@ -209,9 +209,9 @@ def _write_patch(
     """mesh: what the animator sees; the triangles are those of the rest pose."""
     stage, patch = host.stage, session.document.patches[name]
     surface = session.document.surfaces[patch.surface]
-    points = session.geometry.reconstruction(name).points
+    points = session.geometry.points(name)
     positions = _placed(points.positions(mesh), surface.world_from_surface)
-    axis, curve_path = session.geometry.axis(name).points, _axis_path(path)
+    axis, curve_path = session.geometry.axis_points(name), _axis_path(path)
     is_curve = len(axis) > 1
     for old in (path, curve_path):
         stage.RemovePrim(old)

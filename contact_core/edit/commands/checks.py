@@ -24,8 +24,10 @@ def check_placement(document: ContactDocument, patch: Patch, placement: Placemen
     """The placement is possible for the patch in this document: faces in range, parents there, no cycle."""
     surface = document.surface(patch.surface)
     if not isinstance(placement, Link):
-        if placement.face >= surface.faces:
-            raise CommandRejected(f"{surface.name!r} has {surface.faces} faces, but got face {placement.face}.")
+        if placement.face >= surface.carrier_faces:
+            raise CommandRejected(
+                f"{surface.name!r} has {surface.carrier_faces} faces, but got face {placement.face}."
+            )
         return
     parent = document.patch(placement.parent)
     if placement.parent == patch.name or patch.name in document.ancestors(placement.parent):

@@ -110,7 +110,7 @@ class PlaceSurface(BaseCommand):
 
 @dataclass(frozen=True, eq=False)
 class RebindSurface(BaseCommand):
-    """A surface becomes another mesh; shapes and placements hold what was projected onto it.
+    """A surface becomes another mesh, or gets another proxy; shapes and placements hold what was projected onto it.
 
     surface: the new record under the old name. shapes: by key, those drawn anew. placements: new roots and links.
     tracks: by address, keys of places on it with their new roots and ways.
@@ -138,7 +138,7 @@ class RebindSurface(BaseCommand):
         document = place_all(document, self.placements)
         for patch in document.patches.values():
             face = getattr(patch.placement, "face", 0)
-            if patch.surface == self.surface.name and face >= self.surface.faces:
+            if patch.surface == self.surface.name and face >= self.surface.carrier_faces:
                 raise CommandRejected(f"the root of {patch.name!r} is not on the new {self.surface.name!r}.")
         check_links(document)
         for trouble in time_inconsistencies(document):

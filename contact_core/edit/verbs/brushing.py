@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -57,9 +58,23 @@ class BrushVerbs(PaintingVerbs):
         mesh = self._geometry.mesh(where)
         if any(gesture.mesh.digest != mesh.digest for gesture in gestures):
             raise InvalidInput(f"a gesture for {patch!r} was made over another mesh than that of {where!r}.")
+        picked = gestures
+        self._mended([where], lambda verbs: verbs._stroke(tool, patch, where, picked, axis, generator, color))
+
+    def _stroke(
+        self,
+        tool: Brush,
+        patch: str,
+        where: str,
+        gestures: tuple[BrushGesture, ...],
+        axis: SurfacePoints | None,
+        generator: str | AxisGenerator | None,
+        color: Color | None,
+    ) -> None:
+        gestures = tuple(self._carried_gesture(where, gesture) for gesture in gestures)
         marks = [tool.mark(gesture) for gesture in gestures]
         if tool.erases:
-            here = self._geometry.points(patch)
+            here = self._geometry.reconstruction(patch).points
             under = [_covered(here, mark, gesture) for mark, gesture in zip(marks, gestures, strict=True)]
             indices = np.flatnonzero(np.any(under, axis=0))
             if not len(indices):
@@ -68,7 +83,18 @@ class BrushVerbs(PaintingVerbs):
             return
         points = SurfacePoints.concatenate([mark.points for mark in marks])
         strength = np.concatenate([mark.strength for mark in marks])  # (n,)
-        self.paint(patch, points, surface=where, axis=axis, generator=generator, strength=strength, color=color)
+        self._geometry.check_points(where, points, on_carrier=True)
+        picks = None if axis is None else self._geometry.on_carrier(where, axis)
+        self._paint_on_carrier(patch, where, points, picks, generator=generator, strength=strength, color=color)
+
+    def _carried_gesture(self, surface: str, gesture: BrushGesture) -> BrushGesture:
+        """A gesture over a surface as one over the mesh that its contacts run on."""
+        found = self._editor.derived.map(self._document, surface)
+        if found is None:
+            return gesture
+        seen = None if gesture.seen is None else found.followed(gesture.seen)
+        path = found.to_proxy(gesture.path) if len(gesture.path) else gesture.path
+        return replace(gesture, mesh=found.proxy, path=path, seen=seen)
 
     def _gesture(self, surface: str, at: Any, radius: float, spacing: float) -> BrushGesture:
         mesh = self._geometry.mesh(surface)

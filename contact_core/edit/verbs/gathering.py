@@ -53,14 +53,20 @@ class GatheringVerbs(PaintingVerbs):
         parts = self._geometry.touching(surface, other, distance, smallest=smallest)
         if not parts:
             raise InvalidInput(f"nothing of {surface!r} lies within {distance:g} of {other!r} in this pose.")
+        return self._mended([surface], lambda verbs: verbs._paint_parts(name, surface, parts, generator))
+
+    def _paint_parts(
+        self, name: str, surface: str, parts: Sequence[SurfacePoints], generator: str | AxisGenerator | None
+    ) -> tuple[str, ...]:
         names: list[str] = []
         commands: list[Command] = []
         taken = dict.fromkeys(self._document.patches)
         for part in parts:
             new = self._document.free_name(name, taken)
             taken[new] = None
-            picks = self._default_axis(surface, new, part, generator)
-            commands.append(self._painting(new, surface, part, picks, number=len(names)))
+            carried = self._geometry.on_carrier(surface, part)
+            picks = self._default_axis(surface, new, carried, generator)
+            commands.append(self._painting(new, surface, carried, picks, number=len(names)))
             names.append(new)
         self._editor.do(Macro(f"Paint {name} where it touches", tuple(commands)))
         return tuple(names)
@@ -108,7 +114,7 @@ class GatheringVerbs(PaintingVerbs):
         return names
 
     def _frame(self, surface: str, root: Root) -> _Frame:
-        mesh, record, point = self._geometry.mesh(surface), self._document.surface(surface), root.point()
+        mesh, record, point = self._geometry.carrier(surface), self._document.surface(surface), root.point()
         world, unit = record.world_from_surface, record.meters_per_unit
         direction = heading_to_direction(mesh, point, np.array([root.heading]))[0]
         return _Frame(
@@ -121,7 +127,7 @@ class GatheringVerbs(PaintingVerbs):
         """The root nearest to a place in the world (meters) on any of the surfaces, headed as far as it can be."""
         best: tuple[float, str, Root] | None = None
         for surface in onto:
-            mesh, record = self._geometry.mesh(surface), self._document.surface(surface)
+            mesh, record = self._geometry.carrier(surface), self._document.surface(surface)
             back = np.linalg.inv(record.world_from_surface)
             local = back[:3, :3] @ (where / record.meters_per_unit) + back[:3, 3]
             found = Locator.of(mesh).closest(local[None])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -13,10 +15,15 @@ from contact_core.contact.patch import parameterize_patch
 from contact_core.contact.placement import Link, Placement, Root
 from contact_core.contact.shape import PatchCoordinates
 from contact_core.document.document import ContactDocument
+from contact_core.edit.command import Command, apply_command
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.edit.editor import Editor
-from contact_core.errors import InvalidInput
+from contact_core.edit.open_macro import OpenMacro
+from contact_core.errors import InvalidInput, MissingExtra, NotManifold, Unreached
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.topology import Topology
+
+T = TypeVar("T")
 
 
 class VerbGroup:
@@ -33,11 +40,48 @@ class VerbGroup:
     def _geometry(self) -> DocumentGeometry:
         return self._editor.geometry
 
+    def _mended(self, surfaces: Iterable[str], act: Callable[[Self], T]) -> T:
+        """What these verbs return. Where surfaces are too broken for it, those get proxies, and what the verbs make
+        then is one step with it.
+
+        act: takes a group of verbs as this one, of the editor to work in.
+        """
+        names = [name for name in surfaces if name in self._document.surfaces]
+        try:
+            return act(self)
+        except (NotManifold, Unreached) as error:
+            broken = [name for name in names if self._can_be_mended(name, error)]
+            if not broken or not self._editor.makers.mends:
+                raise
+            return self._on_proxies(broken, act, error)
+
+    def _can_be_mended(self, surface: str, error: InvalidInput) -> bool:
+        if self._document.surface(surface).proxy is not None:
+            return False
+        return isinstance(error, Unreached) or not Topology.of(self._geometry.mesh(surface)).is_manifold
+
+    def _on_proxies(self, surfaces: list[str], act: Callable[[Self], T], error: InvalidInput) -> T:
+        from contact_core.edit.verbs.surfaces import Surfaces
+
+        apart = EditorApart(self._editor)
+        try:
+            for surface in surfaces:
+                Surfaces(apart).add_proxy(surface)
+            result = act(type(self)(apart))
+        except MissingExtra as missing:
+            raise type(error)(f"{error} {missing}") from error
+        except InvalidInput:
+            raise error from None  # a proxy is no cure: say what is wrong with the surface
+        command = apart.macro.end()
+        if command is not None:
+            self._editor.do(command)
+        return result
+
     def _measured(self, patch: str, points: SurfacePoints, anchors: IntArray | None = None) -> PatchCoordinates:
-        """Coordinates of points relative to the axis of a patch as it lies now, as they are before its scaling and
-        mirroring. anchors: as for `parameterize_patch`."""
+        """Coordinates of points of the carrier relative to the axis of a patch as it lies now, as they are before
+        its scaling and mirroring. anchors: as for `parameterize_patch`."""
         return parameterize_patch(
-            self._geometry.mesh_of(patch),
+            self._geometry.carrier_of(patch),
             self._geometry.axis(patch),
             points,
             anchors=anchors,
@@ -69,7 +113,7 @@ class VerbGroup:
     def _relinked(self, child: str, link: Link, point: SurfacePoints, tangent: complex) -> Link:
         """The link that puts the child's linked axis point at `point` with `tangent` there."""
         return link_to(
-            self._geometry.mesh_of(child),
+            self._geometry.carrier_of(child),
             link.parent,
             self._geometry.axis(link.parent),
             point,
@@ -92,9 +136,35 @@ class VerbGroup:
     def _axis_from(self, patch: str, root: Root) -> Axis:
         """The axis that the patch would have at another root."""
         return reconstruct_axis(
-            self._geometry.mesh_of(patch),
+            self._geometry.carrier_of(patch),
             self._document.effective_axis(patch),
             root,
             mirrored=self._document.patch(patch).mirrored,
             unit=self._geometry.unit(patch),
         )
+
+
+class EditorApart:
+    """An editor of the same surfaces whose commands become one command of another: `macro` holds them."""
+
+    def __init__(self, editor: Editor) -> None:
+        self.rigs, self.makers, self.derived = editor.rigs, editor.makers, editor.derived
+        self.macro = OpenMacro("Edit on a proxy", editor.timed_document)
+        self._shown, self._is_timed = editor.document, editor.document is not editor.timed_document
+        self.geometry = DocumentGeometry(lambda: self.document, editor.derived, editor.rigs)
+
+    @property
+    def document(self) -> ContactDocument:
+        """The document as the commands so far have it, at the frame of the other editor."""
+        return self._shown if self._is_timed else self.macro.document
+
+    @property
+    def timed_document(self) -> ContactDocument:
+        """The same with its tracks and spans."""
+        return self.macro.document
+
+    def do(self, command: Command, *, origin: str = "user") -> None:
+        """Keep a command. Raises CommandRejected."""
+        self.macro.do(command)
+        if self._is_timed:
+            self._shown = replace(apply_command(command, self._shown), tracks=self._shown.tracks)

@@ -57,12 +57,38 @@ class PaintingVerbs(VerbGroup):
         settings (`plugins.make`). strength: (n,) 0..1, a brush's falloff, multiplies the default weights. Points
         painted twice are kept once.
         """
+        where = self._document.patches[patch].surface if patch in self._document.patches else surface
+        if where is None:
+            raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")
+
+        def act(verbs: PaintingVerbs) -> None:
+            geometry = verbs._geometry
+            carried = geometry.on_carrier(where, points)
+            picks = None if axis is None else geometry.on_carrier(where, axis)
+            turned = heading
+            if axis is not None and heading is not None:
+                turned = geometry.root_at(where, axis[:1], heading).heading
+            verbs._paint_on_carrier(patch, where, carried, picks, turned, dense, generator, strength, color)
+
+        self._mended([where], act)
+
+    def _paint_on_carrier(
+        self,
+        patch: str,
+        surface: str,
+        points: SurfacePoints,
+        picks: SurfacePoints | None,
+        heading: complex | None = None,
+        dense: bool = True,
+        generator: str | AxisGenerator | None = None,
+        strength: Any = None,
+        color: Color | None = None,
+    ) -> None:
+        """The same with points and picks on the mesh that contacts of the surface run on."""
         if patch in self._document.patches:
             self._editor.do(self._extension(patch, points, strength))
             return
-        if surface is None:
-            raise InvalidInput(f"the new patch {patch!r} needs the name of a surface.")
-        picks = self._default_axis(surface, patch, points, generator) if axis is None else axis
+        picks = self._default_axis(surface, patch, points, generator) if picks is None else picks
         self._editor.do(self._painting(patch, surface, points, picks, heading, dense, strength, color))
 
     def _painting(
@@ -78,7 +104,8 @@ class PaintingVerbs(VerbGroup):
         *,
         number: int = 0,
     ) -> Paint:
-        """The command that paints a new patch; `number` counts those painted with it."""
+        """The command that paints a new patch; `number` counts those painted with it. points, picks: on the mesh
+        that contacts of the surface run on."""
         shape, placed = self._shape(surface, points, picks, heading, dense, strength)
         color = color or PALETTE[(len(self._document.patches) + number) % len(PALETTE)]
         key = self._document.free_name(patch, self._document.shapes)
@@ -94,11 +121,14 @@ class PaintingVerbs(VerbGroup):
         """
         if not points:
             raise InvalidInput(f"the region {name!r} has no points.")
-        for surface, batch in points.items():
-            self._geometry.check_points(surface, batch)
-        parts = [
-            (s, part) for s, batch in points.items() for part in connected_parts(self._geometry.mesh(s), batch)
-        ]
+        return self._mended(points, lambda verbs: verbs._paint_region(name, points, axes or {}))
+
+    def _paint_region(
+        self, name: str, points: Mapping[str, SurfacePoints], axes: Mapping[str, SurfacePoints]
+    ) -> tuple[str, ...]:
+        geometry = self._geometry
+        carried = {surface: geometry.on_carrier(surface, batch) for surface, batch in points.items()}
+        parts = [(s, part) for s, batch in carried.items() for part in connected_parts(geometry.carrier(s), batch)]
         if len(parts) > 1 and name in self._document.groups:
             raise CommandRejected(f"there is a group {name!r} already.")
         commands: list[Command] = []
@@ -107,9 +137,11 @@ class PaintingVerbs(VerbGroup):
         for number, (surface, part) in enumerate(parts, start=1):
             patch = self._document.free_name(name if len(parts) == 1 else f"{name}.{number}", taken)
             taken[patch] = None
-            picks = (axes or {}).get(surface)
-            if picks is None:
+            given = axes.get(surface)
+            if given is None:
                 picks = self._default_axis(surface, patch, part)
+            else:
+                picks = geometry.on_carrier(surface, given)
             commands.append(self._painting(patch, surface, part, picks, number=len(names)))
             names.append(patch)
         if len(parts) > 1:
@@ -137,15 +169,16 @@ class PaintingVerbs(VerbGroup):
         the first, where they are. A place that several of them hold is kept once."""
         if not others or patch in others or len(set(others)) != len(others):
             raise CommandRejected(f"merging into {patch!r} needs other patches, each once.")
-        document, mesh = self._document, self._geometry.mesh_of(patch)
+        document, mesh = self._document, self._geometry.carrier_of(patch)
         commands: list[Command] = []
-        known = self._geometry.points(patch)
+        known = self._geometry.reconstruction(patch).points
         for other in others:
             if document.patch(other).surface != document.patch(patch).surface:
                 raise CommandRejected(f"{patch!r} and {other!r} lie on different surfaces: group them instead.")
             shape = document.shape_of(other)
             area_unit = (shape.meters_per_unit / document.shape_of(patch).meters_per_unit) ** 2
-            points, weights = without_doubles(mesh, self._geometry.points(other), shape.weights * area_unit, known)
+            there = self._geometry.reconstruction(other).points
+            points, weights = without_doubles(mesh, there, shape.weights * area_unit, known)
             if len(points):
                 commands.append(Extend(patch, self._measured(patch, points), weights))
             known = SurfacePoints.concatenate([known, points])
@@ -179,7 +212,8 @@ class PaintingVerbs(VerbGroup):
         points: SurfacePoints,
         generator: str | AxisGenerator | None = None,
     ) -> SurfacePoints:
-        """Axis points for a patch that was painted without any."""
+        """Axis points for a patch that was painted without any; they and its points are on the mesh that contacts
+        run on."""
         return self._editor.makers.axis(self._geometry, surface, patch, points, generator)
 
     def _shape(
@@ -191,9 +225,9 @@ class PaintingVerbs(VerbGroup):
         dense: bool,
         strength: Any,
     ) -> tuple[PatchShape, Axis]:
-        mesh = self._geometry.mesh(surface)
-        self._geometry.check_points(surface, points)
-        self._geometry.check_points(surface, picks)
+        mesh = self._geometry.carrier(surface)
+        self._geometry.check_points(surface, points, on_carrier=True)
+        self._geometry.check_points(surface, picks, on_carrier=True)
         points, strength = without_doubles(mesh, points, strength)
         axis_shape, axis = draw_axis(mesh, picks, heading, dense=dense)
         coordinates = parameterize_patch(mesh, axis, points, engine=self._editor.derived.engine)
@@ -204,14 +238,13 @@ class PaintingVerbs(VerbGroup):
         return replace(bare, weights=shares * strength), axis
 
     def _extension(self, patch: str, points: SurfacePoints, strength: Any) -> Extend:
-        here = self._geometry.points(patch)
-        self._geometry.check_points(self._document.patch(patch).surface, points)
-        points, strength = without_doubles(self._geometry.mesh_of(patch), points, strength, here)
+        here = self._geometry.reconstruction(patch).points
+        points, strength = without_doubles(self._geometry.carrier_of(patch), points, strength, here)
         if not len(points):
             raise CommandRejected(f"all of these points are on {patch!r} already.")
         coordinates = self._measured(patch, points)
         shape = self._document.shape_of(patch).extended(coordinates, np.ones(len(points)))
-        together = SurfacePoints.concatenate([here, points]).positions(self._geometry.mesh_of(patch))
+        together = SurfacePoints.concatenate([here, points]).positions(self._geometry.carrier_of(patch))
         shares = measure_area(shape, together).shares[len(here) :] / self._area_unit(patch)
         return Extend(patch, coordinates, shares * strength)
 

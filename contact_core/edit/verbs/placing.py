@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -12,11 +13,12 @@ from contact_core.contact.mirror import mirrored_root
 from contact_core.contact.placement import Link, Root
 from contact_core.contact.transfer import transported
 from contact_core.document.document import Patch
-from contact_core.edit.command import apply_command
+from contact_core.edit.command import Command, apply_command
 from contact_core.edit.commands import Bend, LinkPatch, Mirror, Rotate, Scale, Transfer, Translate, Unlink
 from contact_core.edit.verbs.group import VerbGroup
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.topology import Topology
 
 
 class PlacingVerbs(VerbGroup):
@@ -24,15 +26,38 @@ class PlacingVerbs(VerbGroup):
 
     def translate(self, patch: str, to: SurfacePoints) -> None:
         """Move a patch so that its first axis point comes to one surface point, kept parallel along the way."""
-        root = transported(self._geometry.mesh_of(patch), self._geometry.root(patch), to)
-        self._editor.do(Translate(patch, self._placement_at(patch, root)))
+        surface = self._document.patch(patch).surface
+
+        def act(verbs: PlacingVerbs) -> None:
+            geometry = verbs._geometry
+            carried = geometry.on_carrier(surface, to)
+            root = transported(geometry.carrier_of(patch), geometry.root(patch), carried)
+            verbs._do_where_it_can_walk(Translate(patch, verbs._placement_at(patch, root)), [patch])
+
+        self._mended([surface], act)
 
     def place(
         self, patch: str, point: SurfacePoints, *, heading: complex | None = None, direction: Any = None
     ) -> None:
         """Move a patch to a surface point with a given heading, or a direction (3,) in surface space."""
-        root = self._geometry.root_at(self._document.patch(patch).surface, point, heading, direction)
-        self._editor.do(Translate(patch, self._placement_at(patch, root)))
+        surface = self._document.patch(patch).surface
+
+        def act(verbs: PlacingVerbs) -> None:
+            root = verbs._geometry.root_at(surface, point, heading, direction)
+            verbs._do_where_it_can_walk(Translate(patch, verbs._placement_at(patch, root)), [patch])
+
+        self._mended([surface], act)
+
+    def _do_where_it_can_walk(self, command: Command, patches: Iterable[str]) -> None:
+        """Do what places patches; on a surface that is broken somewhere they are traced first.
+
+        Raises NotManifold where they cannot be.
+        """
+        after = apply_command(command, self._document)
+        for patch in patches:
+            if not Topology.of(self._editor.derived.carrier(after, after.patch(patch).surface)).is_manifold:
+                self._editor.derived.patch(after, patch)
+        self._editor.do(command)
 
     def rotate(self, patch: str, angle: float, *, about: int = 0) -> None:
         """Turn a patch by `angle` (radians, counter-clockwise seen from outside) about one of its axis points."""
@@ -48,7 +73,7 @@ class PlacingVerbs(VerbGroup):
         axis = self._geometry.axis(patch)
         self._check_axis_point(patch, about)
         root, cut = root_from_point(
-            self._geometry.mesh_of(patch),
+            self._geometry.carrier_of(patch),
             self._document.effective_axis(patch),
             about,
             axis.points[about],
@@ -117,15 +142,24 @@ class PlacingVerbs(VerbGroup):
         descendants: bool = True,
     ) -> dict[str, str]:
         """Copy a patch and all its descendants, in one go; returns the copies' names by the names copied."""
+
+        def act(verbs: PlacingVerbs) -> dict[str, str]:
+            root = verbs._geometry.root_at(surface, point, heading, direction)
+            return verbs._copied_tree(patch, surface, root, names or {}, mirrored, descendants)
+
+        return self._mended([surface], act)
+
+    def _copied_tree(
+        self, patch: str, surface: str, root: Root, names: dict[str, str], mirrored: bool, descendants: bool
+    ) -> dict[str, str]:
         document = self._document
         target = document.surface(surface)
-        root = self._geometry.root_at(surface, point, heading, direction)
         units = document.surface(document.patch(patch).surface).meters_per_unit / target.meters_per_unit
         copies: dict[str, Patch] = {}
         taken = dict.fromkeys(document.patches)
         for name in (patch, *(document.descendants(patch) if descendants else ())):
             source = document.patch(name)
-            wanted = (names or {}).get(name)
+            wanted = names.get(name)
             new = wanted or document.free_name(f"{name}.{surface}", taken)
             taken[new] = None
             copies[name] = replace(
@@ -139,7 +173,8 @@ class PlacingVerbs(VerbGroup):
                 along=source.along if not source.original else 1.0,
                 spread=source.spread if not source.original else 1.0,
             )
-        self._editor.do(Transfer(tuple(copies.values())))
+        copied = [copy.name for copy in copies.values()]
+        self._do_where_it_can_walk(Transfer(tuple(copies.values())), copied)
         return {name: copy.name for name, copy in copies.items()}
 
     def symmetric_copy(
@@ -147,8 +182,8 @@ class PlacingVerbs(VerbGroup):
     ) -> str:
         """Copy a patch across a mirror plane of its surface (points x with normal . x = offset)."""
         surface = self._document.patch(patch).surface
-        root, _ = mirrored_root(self._geometry.mesh(surface), self._geometry.root(patch), normal, offset)
-        return self.transfer(patch, surface, root.point(), heading=root.heading, name=name)
+        root, _ = mirrored_root(self._geometry.carrier(surface), self._geometry.root(patch), normal, offset)
+        return self._copied_tree(patch, surface, root, {} if name is None else {patch: name}, True, False)[patch]
 
     def link(self, child: str, parent: str, *, parent_point: int = 0, own_point: int = 0) -> None:
         """Make a patch the child of another, by the geodesic between two axis points, where both are now."""
@@ -161,7 +196,7 @@ class PlacingVerbs(VerbGroup):
         axis = self._geometry.axis(child)
         self._check_axis_point(child, own_point)
         link = link_to(
-            self._geometry.mesh_of(child),
+            self._geometry.carrier_of(child),
             parent,
             self._geometry.axis(parent),
             axis.points[own_point],

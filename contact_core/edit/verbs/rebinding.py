@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -17,8 +18,9 @@ from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.timeline import Track, of_address
 from contact_core.edit.commands import RebindSurface
 from contact_core.edit.editor import Editor
+from contact_core.errors import NotManifold
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.raycast import Locator
+from contact_core.geometry.surface_map import SurfaceMap
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.motion.placement_keys import PlacementKey, PlacementKeys
@@ -37,12 +39,14 @@ class RebindReport:
 
 
 def plan_rebind(editor: Editor, new: Surface, mesh: TriangleMesh) -> tuple[RebindSurface, RebindReport]:
-    """The command that puts the contacts of a surface onto a new mesh under the same name.
+    """The command that puts the contacts of a surface onto a new mesh under the same name, or on another proxy.
+
+    new: the record of it. mesh: what its contacts run on then.
 
     Points and axes of original patches are projected to their closest points and measured anew; copies keep their
     shape and get their root and direction projected. Links are drawn anew between the projected axes.
     """
-    document, old_mesh = editor.document, editor.geometry.mesh(new.name)
+    document, old_mesh = editor.document, editor.geometry.carrier(new.name)
     on_it = [name for name, patch in document.patches.items() if patch.surface == new.name]
     shapes: dict[str, PatchShape] = {}
     axes: dict[str, Axis] = {}
@@ -60,8 +64,9 @@ def plan_rebind(editor: Editor, new: Surface, mesh: TriangleMesh) -> tuple[Rebin
             root = _projected_root(editor.geometry.root(name), old_mesh, mesh)
             axes[name] = reconstruct_axis(mesh, own, root, mirrored=patch.mirrored, unit=unit)
         points = points_from_axis(mesh, shape.coordinates, axes[name], own, mirrored=patch.mirrored, unit=unit)
-        before = editor.geometry.points(name).positions(old_mesh)
-        moves[name] = float(np.linalg.norm(points.points.positions(mesh) - before, axis=1).max(initial=0.0))
+        with contextlib.suppress(NotManifold):  # a copy that could not be walked where it was moved no distance
+            before = editor.geometry.reconstruction(name).points.positions(old_mesh)
+            moves[name] = float(np.linalg.norm(points.points.positions(mesh) - before, axis=1).max(initial=0.0))
     placements = [(name, _placed(editor, name, mesh, axes)) for name in on_it]
     placements += _links_elsewhere(editor, new.name, shapes)
     tracks = placed_tracks(editor, new.name, mesh, lambda root: _projected_root(root, old_mesh, mesh))
@@ -93,7 +98,7 @@ def _links_elsewhere(
         if {patch.shape, editor.document.patch(link.parent).shape} & set(shapes):
             root, above = editor.geometry.root(name), editor.geometry.root(link.parent)
             first = Axis(above.point(), np.array([above.heading]), np.zeros(1))
-            yield name, link_to(editor.geometry.mesh_of(name), link.parent, first, root.point(), root.heading)
+            yield name, link_to(editor.geometry.carrier_of(name), link.parent, first, root.point(), root.heading)
 
 
 def _projected_shape(
@@ -105,7 +110,7 @@ def _projected_shape(
     axis_points = _closest(editor.geometry.axis(name).points, old_mesh, mesh)
     heading = _projected_root(editor.geometry.root(name), old_mesh, mesh).heading
     drawn, axis = draw_axis(mesh, axis_points, heading, dense=False)
-    points = _closest(editor.geometry.points(name), old_mesh, mesh)
+    points = _closest(editor.geometry.reconstruction(name).points, old_mesh, mesh)
     unit = old.meters_per_unit / new.meters_per_unit
     coordinates = parameterize_patch(
         mesh, axis, points, mirrored=patch.mirrored, unit=unit, engine=editor.derived.engine
@@ -144,7 +149,7 @@ def _placed(editor: Editor, name: str, mesh: TriangleMesh, axes: Mapping[str, Ax
 
 
 def _closest(points: SurfacePoints, old_mesh: TriangleMesh, mesh: TriangleMesh) -> SurfacePoints:
-    return Locator.of(mesh).closest(points.positions(old_mesh)).points
+    return SurfaceMap(old_mesh, mesh).to_proxy(points)
 
 
 def _projected_root(root: Root, old_mesh: TriangleMesh, mesh: TriangleMesh) -> Root:

@@ -33,11 +33,13 @@ class ReshapingVerbs(PaintingVerbs):
     ) -> None:
         """Draw the axis of a patch anew. Its points, its children and its partners stay where they are."""
         surface = self._document.patch(patch).surface
-        points = self._geometry.points(patch)
+        points = self._geometry.reconstruction(patch).points
         if picks is None:
             picks = self._default_axis(surface, patch, points, generator)
-        self._geometry.check_points(surface, picks)
-        shape, axis = draw_axis(self._geometry.mesh(surface), picks, heading, dense=dense)
+        else:
+            heading = None if heading is None else self._geometry.root_at(surface, picks[:1], heading).heading
+            picks = self._geometry.on_carrier(surface, picks)
+        shape, axis = draw_axis(self._geometry.carrier(surface), picks, heading, dense=dense)
         self._editor.do(self._reshaping(patch, points, shape, axis, "Set the axis of"))
 
     def bind(self, patch: str, indices: Any, axis_point: int) -> None:
@@ -46,7 +48,7 @@ class ReshapingVerbs(PaintingVerbs):
         shape = self._document.shape_of(patch)
         anchors = shape.coordinates.anchors.copy()
         anchors[self._point_indices(patch, indices)] = axis_point
-        coordinates = self._measured(patch, self._geometry.points(patch), anchors)
+        coordinates = self._measured(patch, self._geometry.reconstruction(patch).points, anchors)
         self._editor.do(Reshape(patch, replace(shape, coordinates=coordinates), (), "Bind points of"))
 
     def weigh(self, patch: str, weights: Any) -> None:
@@ -67,7 +69,7 @@ class ReshapingVerbs(PaintingVerbs):
     ) -> Reshape:
         """A new axis under a patch: coordinates anew, and placements that keep everything where it is."""
         source = self._document.patch(patch)
-        mesh = self._geometry.mesh_of(patch)
+        mesh = self._geometry.carrier_of(patch)
         unit = self._geometry.unit(patch)
         if source.turns or source.along != 1.0 or source.spread != 1.0:
             raise CommandRejected(
@@ -90,11 +92,11 @@ class ReshapingVerbs(PaintingVerbs):
     def _followed(self, patch: str, partner: str, axis: Axis) -> Root:
         """Where a partner has the new first axis point of a patch: the way there from the old axis, over there."""
         here, there = self._geometry.axis(patch), self._geometry.axis(partner)
-        way = link_to(self._geometry.mesh_of(patch), patch, here, axis.points[0], complex(axis.tangents[0]))
+        way = link_to(self._geometry.carrier_of(patch), patch, here, axis.points[0], complex(axis.tangents[0]))
         if self._document.patch(patch).mirrored != self._document.patch(partner).mirrored:
             way = way.mirrored()
         ratio = self._geometry.unit(partner) / self._geometry.unit(patch)
-        point, tangent, _ = follow_link(self._geometry.mesh_of(partner), there, way.scaled(ratio))
+        point, tangent, _ = follow_link(self._geometry.carrier_of(partner), there, way.scaled(ratio))
         return Root.at(point, tangent)
 
     def _rooted(self, name: str, root: Root) -> Placement:
@@ -113,7 +115,7 @@ class ReshapingVerbs(PaintingVerbs):
             own = self._geometry.axis(child)
             first = Axis(root.point(), np.array([root.heading]), np.zeros(1))
             kept.append((child, link_to(
-                self._geometry.mesh_of(child), name, first, own.points[link.own_point],
+                self._geometry.carrier_of(child), name, first, own.points[link.own_point],
                 complex(own.tangents[link.own_point]), own_point=link.own_point,
             )))  # fmt: skip
         return kept

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from contact_core.contact.placement import Link, Root
-from contact_core.document.document import Patch
+from contact_core.document.document import Patch, Surface
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.library import ContactSet, load_contact_set, save_contact_set
 from contact_core.edit.commands import Import
@@ -80,7 +80,7 @@ class ContactSets(VerbGroup):
                 placement = replace(placement.scaled(units), parent=names[placement.parent])
             elif roots is not None and patch.name in roots:
                 placement = roots[patch.name]
-            elif new.topology_digest != old.topology_digest:
+            elif (new.topology_digest, _proxy(new)) != (old.topology_digest, _proxy(old)):
                 missing.append(patch.name)
             name, key = names[patch.name], keys[patch.shape]
             patches.append(replace(patch, name=name, surface=new.name, shape=key, placement=placement))
@@ -106,3 +106,8 @@ class ContactSets(VerbGroup):
             names[name] = self._document.free_name(name, taken)
             taken[names[name]] = None
         return names
+
+
+def _proxy(surface: Surface) -> str | None:
+    """The digest of a surface's proxy, whose faces its roots name."""
+    return None if surface.proxy is None else surface.proxy.digest

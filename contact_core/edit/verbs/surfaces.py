@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contact_core.document.document import Surface
+from contact_core.document.document import Proxy, Surface
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.commands import (
     AddSurface,
@@ -22,11 +22,14 @@ from contact_core.edit.verbs.group import VerbGroup
 from contact_core.edit.verbs.rebinding import RebindReport, placed_tracks, plan_rebind
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.topology import closed_manifold
+from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.rig import Pose, Rig
 
 
 class Surfaces(VerbGroup):
-    """Add, rebind, rename, remove, place and pose surfaces, and bring the meshes and rigs behind them."""
+    """Add, rebind, rename, remove, place and pose surfaces, give broken ones proxies, and bring the meshes and rigs
+    behind them."""
 
     @property
     def meshes(self) -> dict[str, TriangleMesh]:
@@ -70,6 +73,8 @@ class Surfaces(VerbGroup):
             self._editor.rigs[name] = rig
         if known is None:
             self._editor.do(AddSurface(wanted), origin="asset")
+        elif known.digest != wanted.digest and known.proxy is not None:
+            self.rebind(name, mesh)
         elif known.digest != wanted.digest:
             tracks = placed_tracks(self._editor, name, mesh, lambda root: root)
             same = replace(known, digest=wanted.digest)
@@ -79,7 +84,8 @@ class Surfaces(VerbGroup):
     def rebind(self, name: str, mesh: TriangleMesh, *, old_mesh: TriangleMesh | None = None) -> RebindReport:
         """Put the contacts of a surface onto another mesh under the same name, and say how far they moved.
 
-        The old mesh has to be known: brought before, or given. Undo goes back to it.
+        The old mesh has to be known: brought before, or given. Undo goes back to it. A proxy is made anew, from the
+        new mesh.
         """
         known = self._document.surface(name)
         if old_mesh is not None:
@@ -93,8 +99,59 @@ class Surfaces(VerbGroup):
             points=len(mesh.points),
             faces=len(mesh.faces),
         )
-        command, report = plan_rebind(self._editor, changed, mesh)
+        carrier = mesh
+        if known.proxy is not None:
+            proxy, carrier = self._remade(known.proxy, mesh)
+            changed = replace(changed, proxy=proxy)
         self._editor.derived.bring(mesh)
+        return self._carry_by(changed, carrier)
+
+    def add_proxy(
+        self,
+        surface: str,
+        maker: str | None = None,
+        *,
+        mesh: TriangleMesh | None = None,
+        progress: Progress = NO_PROGRESS,
+        **settings: Any,
+    ) -> RebindReport:
+        """Have the contacts of a surface run on a closed manifold near its mesh, and say how far they moved.
+
+        Points are still picked and given on the surface's own mesh. maker: a proxy maker's name, with its settings;
+        None is the default. mesh: a proxy of one's own instead, near the mesh. A surface that has one gets another.
+        Raises InvalidInput for a mesh that is no closed manifold, MissingExtra, Cancelled.
+        """
+        record, source = self._document.surface(surface), self._editor.geometry.mesh(surface)
+        if mesh is not None:
+            proxy, carrier = Proxy("", FrozenMap(), mesh.digest, len(mesh.faces)), closed_manifold(mesh, surface)
+        else:
+            proxy, carrier = self._editor.makers.proxy(source, maker, settings, progress)
+        return self._carry_by(replace(record, proxy=proxy), carrier)
+
+    def remove_proxy(self, surface: str) -> RebindReport:
+        """Have the contacts of a surface run on its own mesh again, and say how far they moved."""
+        record = self._document.surface(surface)
+        if record.proxy is None:
+            raise InvalidInput(f"{surface!r} has no proxy.")
+        return self._carry_by(replace(record, proxy=None), self._editor.geometry.mesh(surface))
+
+    def know_proxy(self, surface: str, mesh: TriangleMesh) -> None:
+        """Bring the proxy mesh that the document names for a surface. Raises InvalidInput for any other."""
+        proxy = self._document.surface(surface).proxy
+        if proxy is None or proxy.digest != mesh.digest:
+            raise InvalidInput(f"the contacts of {surface!r} do not run on that mesh.")
+        self._editor.derived.bring(mesh)
+
+    def _remade(self, proxy: Proxy, mesh: TriangleMesh) -> tuple[Proxy, TriangleMesh]:
+        """A proxy like another, of another mesh."""
+        if not proxy.maker:
+            raise InvalidInput("the proxy was brought, and fits the old mesh only: remove it first (remove_proxy).")
+        return self._editor.makers.proxy(mesh, proxy.maker, proxy.settings)
+
+    def _carry_by(self, record: Surface, carrier: TriangleMesh) -> RebindReport:
+        """Put the contacts of a surface onto a mesh, which becomes what they run on."""
+        command, report = plan_rebind(self._editor, record, carrier)
+        self._editor.derived.bring(carrier)
         self._editor.do(command)
         return report
 

@@ -193,7 +193,7 @@ class Film:
         else:
             known = self._known(kind, name).of(PlacementKey)
             others = [(k.frame, k.root, k.interpolation) for k in known if k is not key and k.frame != to]
-            mesh = self._editor.derived.mesh(self.document, self.document.patch(name).surface)
+            mesh = self._editor.derived.carrier(self.document, self.document.patch(name).surface)
             moved = PlacementKeys.of(mesh, [*others, (float(to), key.root, key.interpolation)]).keys
         self._editor.do(SetKeys(address(kind, name), moved, gone, "Move a key of"))
 
@@ -337,8 +337,8 @@ class Film:
         if isinstance(value, Link):
             raise CommandRejected(f"{name!r} is a child and moves with its parent: unlink it before it gets keys.")
         surface = document.surface(document.patch(name).surface)
-        mesh = self._editor.derived.mesh(document, surface.name)
-        root = value if isinstance(value, Root) else self._editor.derived.walked(mesh, surface.digest, value)
+        mesh, digest = self._editor.derived.carrier(document, surface.name), surface.carrier_digest
+        root = value if isinstance(value, Root) else self._editor.derived.walked(mesh, digest, value)
         if track is None:
             return PlacementKeys.of(mesh, [(frame, root, interpolation)]).keys
         old = track.of(PlacementKey)
@@ -350,7 +350,7 @@ class Film:
         if not isinstance(track.keys[0], PlacementKey) or len(track.keys) == 1:
             return ()
         old = track.of(PlacementKey)
-        mesh = self._editor.derived.mesh(self.document, self.document.patch(name).surface)
+        mesh = self._editor.derived.carrier(self.document, self.document.patch(name).surface)
         new = PlacementKeys(old).without_key(mesh, frame).keys
         return tuple(key for key in new if key not in old)
 

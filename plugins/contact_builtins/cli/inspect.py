@@ -32,18 +32,10 @@ class Inspect:
 
 def _draw(asset: Any, arguments: argparse.Namespace) -> None:
     """The hand's picture by the first renderer that can draw. Raises InvalidInput without a hand or renderer."""
+    from contact_builtins.cli.drawing import draw
     from contact_builtins.cli.hand_picture import hand_pictures
-    from contact_core.errors import ContactError, InvalidInput
-    from contact_core.plugins.registry import RENDERERS
 
-    pictures = hand_pictures(asset)
-    reasons = []
-    for renderer in sorted(arguments.plugins.offers(RENDERERS).values(), key=lambda r: (-r.priority, r.name)):
-        try:
-            return renderer.render(pictures, arguments.picture, size=(1600, 800))
-        except ContactError as error:
-            reasons.append(f"{renderer.name}: {error}")
-    raise InvalidInput("no renderer could draw the picture: " + ("; ".join(reasons) or "no plugin offers one."))
+    draw(hand_pictures(asset), arguments.plugins, arguments.picture)
 
 
 def _hand_lines(hand: dict[str, Any]) -> list[str]:

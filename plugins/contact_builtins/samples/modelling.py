@@ -39,10 +39,29 @@ def surface_of(
 
 def level_set(field: Field, low: Any, high: Any, grid: float) -> TriangleMesh:
     """The zero level set as manifold3d meshes it, its largest piece."""
+    return closed_surfaces(field, low, high, grid, ("Building a sample", "samples"))[0]
+
+
+def closed_surfaces(
+    field: Field,
+    low: Any,
+    high: Any,
+    grid: float,
+    extra: tuple[str, str],
+    *,
+    steep: float = 1.2,
+    simpler: float = 0.0,
+) -> list[TriangleMesh]:
+    """The pieces of the zero level set within a box as manifold3d meshes it, largest volume first.
+
+    extra: what needs the library, and the extra that brings it, for the error. steep: how much faster than one
+    moves the field may change, at most. simpler: grid lengths that the surface may move for larger triangles.
+    Raises MissingExtra.
+    """
     try:
         import manifold3d
     except ImportError as error:
-        raise MissingExtra("Building a sample", "samples") from error
+        raise MissingExtra(*extra) from error
     bounds = [float(v) for v in (*low, *high)]
     lattice: list[tuple[float, float, float]] = []
 
@@ -53,23 +72,29 @@ def level_set(field: Field, low: Any, high: Any, grid: float) -> TriangleMesh:
     # Which points the library asks for does not depend on the answers: a first pass collects them, one
     # vectorised call answers them all, a second pass reads the answers.
     manifold3d.Manifold.level_set(ask, bounds, grid)
-    inside = -_near_the_surface(field, np.array(lattice), grid)  # manifold3d calls the inside positive
+    inside = -_near_the_surface(field, np.array(lattice), grid, steep)  # manifold3d calls the inside positive
     answers = dict(zip(lattice, inside.tolist(), strict=True))
     solid = manifold3d.Manifold.level_set(lambda x, y, z: answers[x, y, z], bounds, grid)
+    if simpler:
+        solid = solid.simplify(simpler * grid)
     pieces = sorted(solid.decompose(), key=lambda piece: -piece.volume())
-    return from_manifold(pieces[0])
+    return [from_manifold(piece) for piece in pieces]
 
 
-def _near_the_surface(field: Field, lattice: FloatArray, grid: float) -> FloatArray:
+def _near_the_surface(field: Field, lattice: FloatArray, grid: float, steep: float) -> FloatArray:
     """Field values (n,), exact near the surface; farther off, blocks of points share one value of the right sign.
 
     A distance field changes no faster than one moves, so a block whose centre is far from the surface holds none.
     """
     size = 3.0 * grid
-    cells, cell_of = np.unique(np.floor(lattice / size).astype(np.int64), axis=0, return_inverse=True)
+    cell = np.floor(lattice / size).astype(np.int64)
+    first = cell.min(axis=0)
+    sides = cell.max(axis=0) - first + 1
+    numbers, cell_of = np.unique(np.ravel_multi_index((cell - first).T, sides), return_inverse=True)
+    cells = np.stack(np.unravel_index(numbers, sides), axis=1) + first
     centre = field(np.asarray((cells + 0.5) * size, np.float64))[cell_of.reshape(-1)]  # (n,)
     # half a block's diagonal, a cell of the lattice, and a fifth more: blends and ellipsoids are not quite exact
-    near = np.abs(centre) < 1.2 * (0.5 * np.sqrt(3.0) * size + 2.0 * grid)
+    near = np.abs(centre) < steep * (0.5 * np.sqrt(3.0) * size + 2.0 * grid)
     values = centre.copy()
     values[near] = field(np.asarray(lattice[near]))
     return values

@@ -179,6 +179,12 @@ CASES: list[tuple[str, Callable[[Session], object]]] = [
         "surfaces.rebind",
         lambda s: s.surfaces.rebind("torus", cached_family("plane"), old_mesh=cached_family("sphere")),
     ),
+    ("surfaces.add_proxy", lambda s: s.surfaces.add_proxy("moon")),
+    ("surfaces.add_proxy", lambda s: s.surfaces.add_proxy("torus", "nothing")),
+    ("surfaces.add_proxy", lambda s: s.surfaces.add_proxy("torus", offset=NAN)),
+    ("surfaces.add_proxy", lambda s: s.surfaces.add_proxy("torus", mesh=cached_family("plane"))),
+    ("surfaces.remove_proxy", lambda s: s.surfaces.remove_proxy("torus")),
+    ("surfaces.know_proxy", lambda s: s.surfaces.know_proxy("torus", cached_family("sphere"))),
     ("macro", lambda s: s.do(Macro("half", (s.patches._painting("a", "torus", HERE, HERE, 1j),) * 2))),
 ]
 READING = {
@@ -197,6 +203,11 @@ READING = {
         "pairs",
         "posed_mesh",
         "axis_request",
+        "carrier",
+        "carrier_of",
+        "on_carrier",
+        "seen",
+        "axis_points",
     ]
 }  # it changes nothing
 
