@@ -204,6 +204,11 @@ class Interaction:
             raise
         return bool(self._moved or self._parts)
 
+    @property
+    def is_due(self) -> bool:
+        """Whether `advance` has something to do: a pose to follow up, work that is under way."""
+        return (self._live is not None and self._live.is_due) or self.worker.status is not None
+
     def cancel(self) -> None:
         """Put back the gesture that is under way: the document is the very one of the press."""
         gesture = self._gesture
@@ -272,7 +277,7 @@ class Interaction:
         try:
             gesture.release(event)
             if live is not None:
-                live.follow()
+                live.finish()
         except ContactError:
             self.cancel()
             raise

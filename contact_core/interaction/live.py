@@ -7,97 +7,149 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import SetPose
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
 from contact_core.rig.rig import Pose
-from contact_core.scene.problem import Objective, poses_of, problem_of
+from contact_core.scene.problem import Objective, contact_of, poses_of, problem_of, world_from_surface
+from contact_core.solve.body import PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolver, SolveOptions
+from contact_core.solve.solver import PoseSolver, SolveOptions, SolveStatus
 from contact_core.solve.terms import PoseTerm, paper_terms
 
 if TYPE_CHECKING:
     from contact_core.interaction.desk import Desk
+    from contact_core.session import Session
+
+_STEPS_AT_RELEASE = 12
 
 
 class LiveSolve:
-    """The solve that follows one gesture: each from the pose before, so the newest state costs a few steps.
+    """The solve that follows one gesture.
 
-    milliseconds: of the last solve. solves: how many there were; tests guard the cost by counting.
+    The problem stays warm: bodies, charts, what a term needs of the skin, and the contacts that are not dragged are
+    kept from step to step (`PoseProblem.continued`), and each step starts from the pose before. So a step makes a
+    few iterations, and the next one goes on until the pose has settled.
+
+    milliseconds: of the last step. solves: how many there were; tests guard the cost by counting.
     """
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._start: Mapping[str, Pose] = dict(desk.document.poses)
         self._last = self._start
+        self._contacts = KeptContacts(desk.session)
         self._seen: tuple[object, ...] = self._asked_of(desk.document)
         self._done: Command | None = None
+        self._edit: Command | None = None
         self._pinned: tuple[PoseTerm, ...] = ()
+        self._warm: tuple[tuple[object, ...], PoseProblem] | None = None
+        self._theta: FloatArray | None = None
+        self._settled = True
         self.milliseconds, self.solves = 0.0, 0
 
     @property
     def is_due(self) -> bool:
-        """Whether the gesture previews something that no solve has followed yet."""
+        """Whether the gesture previews something that no solve has followed yet, or to the end."""
         desk = self._desk
-        follows = desk.settings.live and not desk.settled and desk.command not in (None, self._done)
-        return follows or (bool(desk.pins) and desk.pins is not self._pinned)
+        if desk.pins and (desk.pins is not self._pinned or not self._settled):
+            return True
+        if not desk.settings.live or desk.settled or desk.command is None:
+            return False
+        return desk.command is not self._done or not self._settled
+
+    def finish(self) -> None:
+        """Follow until the pose has settled, or for as many iterations as a solve beside the window may make."""
+        for _ in range(_STEPS_AT_RELEASE):
+            if not self.follow():
+                return
 
     def follow(self) -> bool:
-        """Solve for what is previewed, and preview the pose with it; whether there was anything to solve.
+        """One step for what is previewed, and preview the pose with it; whether there was anything to do.
 
         Raises InvalidInput for settings and plugins that do not fit the problem.
         """
+        desk = self._desk
         if not self.is_due:
             return False
-        edit = None if self._desk.command is self._done else self._desk.command
-        self._done, self._pinned = self._desk.command, self._desk.pins
-        asked = self._asked_of(self._desk.document)
-        if _same(asked, self._seen) and self._last is self._start:
-            return False  # nothing that a pair sees has changed
+        if desk.command is not self._done:
+            self._edit = desk.command
+        self._done, self._pinned = desk.command, desk.pins
+        asked = self._asked_of(desk.document)
+        if _same(asked, self._seen) and self._settled:
+            return self._preview({n: p for n, p in self._last.items() if p is not self._start.get(n)})
         self._seen = asked
         began = time.perf_counter()
-        poses = self._solved(self._desk.document)
+        poses = self._solved(desk.document)
+        self._last = {**self._last, **poses}
+        shown = self._preview(poses)
+        self.milliseconds, self.solves = 1e3 * (time.perf_counter() - began), self.solves + 1
+        return shown
+
+    def _preview(self, poses: Mapping[str, Pose]) -> bool:
+        """Preview the edit with poses; whether there are any."""
         if not poses:
             return False
-        self._last = {**self._last, **poses}
         posing = tuple(SetPose(name, pose) for name, pose in poses.items())
-        title = "Pose " + ", ".join(poses) if edit is None else edit.label()
-        self._done = Macro(title, (*(() if edit is None else (edit,)), *posing))
+        title = "Pose " + ", ".join(poses) if self._edit is None else self._edit.label()
+        self._done = Macro(title, (*(() if self._edit is None else (self._edit,)), *posing))
         self._desk.stroke.do(self._done)
-        self.milliseconds, self.solves = 1e3 * (time.perf_counter() - began), self.solves + 1
         return True
 
     def _asked_of(self, document: ContactDocument) -> tuple[object, ...]:
-        """What a solve depends on, by identity: points of paired patches, weights, where surfaces stand, pins."""
-        derived = self._desk.session.derived
-        asked: list[object] = [*document.pairs.values(), *document.surfaces.values(), *self._desk.pins]
-        for pair in document.pairs.values():
-            for end in (pair.manipulator, pair.object):
-                if document.surface(document.patch(end).surface).digest in derived.known_meshes:
-                    asked += [derived.patch(document, end), document.shape_of(end).weights]
-        return tuple(asked)
+        """What a solve depends on, by identity: contacts, where surfaces stand, pins."""
+        return (*self._contacts.of(document), *document.surfaces.values(), *self._desk.pins)
 
     def _solved(self, document: ContactDocument) -> dict[str, Pose]:
         """Poses by surface for a document, none where nothing pulls on a rig."""
         problem = self._problem(document)
         if problem is None or not len(problem.start):
+            self._settled = True
             return {}
         options = SolveOptions(max_iterations=self._desk.settings.iterations, candidates=("current",))
-        return poses_of(self._solver().solve(problem, options), self._desk.session.rigs)
+        solution = self._solver().solve(problem, options)
+        self._theta = solution.theta
+        self._settled = solution.status is not SolveStatus.STOPPED
+        return poses_of(solution, self._desk.session.rigs)
 
     def _problem(self, document: ContactDocument) -> PoseProblem | None:
-        desk, rigs = self._desk, self._desk.session.rigs
-        posed = replace(document, poses=document.poses.updated(dict(self._last)))
-        pulled = tuple(name for name in _bodies(desk.pins) if name in rigs)
-        if not document.pairs and not pulled:
+        """The problem of a document: that of the last step with what is new, or made anew where it is another."""
+        desk, contacts = self._desk, self._contacts.of(document)
+        pulled = tuple(name for name in _bodies(desk.pins) if name in desk.session.rigs)
+        if not contacts and not pulled:
             return None
-        objective = Objective(prior=self._prior(), bodies=pulled)
+        bodies = dict.fromkeys(n for each in contacts for n in (each.manipulator, each.object))
+        bodies.update(dict.fromkeys(pulled))
+        kind = (*bodies, desk.held, desk.settings)
+        if self._warm is not None and self._warm[0] == kind and self._theta is not None:
+            before = self._warm[1]
+            own = tuple(term for term in before.terms if not getattr(term, "bodies", ()))
+            moved = tuple(
+                replace(b, world_from_rig=world_from_surface(document, b.name, desk.scene.meters_per_unit))
+                for b in before.bodies
+            )
+            problem = before.continued(self._theta, contacts, own + desk.pins, moved)
+        else:
+            problem = self._made(document, contacts, pulled)
+        if all(body.black_box is None for body in problem.bodies):
+            self._warm = kind, problem
+        return problem
+
+    def _made(
+        self, document: ContactDocument, contacts: tuple[PairedPoints, ...], pulled: tuple[str, ...]
+    ) -> PoseProblem:
+        desk = self._desk
+        posed = replace(document, poses=document.poses.updated(dict(self._last)))
+        pairs = tuple(contact.name for contact in contacts)
+        objective = Objective(prior=self._prior(), bodies=pulled, pairs=pairs)
+        evaluated = desk.session.binding.evaluated(sorted(document.surfaces)) if desk.session.host else None
         problem = problem_of(
-            desk.session.geometry.of(posed), rigs, objective, meters_per_unit=desk.scene.meters_per_unit
+            desk.session.geometry.of(posed), desk.session.rigs, objective, evaluated, desk.scene.meters_per_unit
         )
-        return replace(problem, terms=self._terms(problem), held=self._held(problem))
+        return replace(problem, contacts=contacts, terms=self._terms(problem), held=self._held(problem))
 
     def _prior(self) -> Literal["rest", "current"] | Mapping[str, Pose]:
         kind = self._desk.settings.prior
@@ -123,6 +175,47 @@ class LiveSolve:
             return LevenbergMarquardt()
         found: PoseSolver = self._desk.made(POSE_SOLVERS, name)
         return found
+
+
+class KeptContacts:
+    """The pairs of a document as contacts; a pair none of whose patches changed is the same object again."""
+
+    def __init__(self, session: Session) -> None:
+        self._geometry, self._known = session.geometry, session.derived.known_meshes
+        self._kept: dict[str, tuple[tuple[object, ...], PairedPoints]] = {}
+        self._of: tuple[ContactDocument | None, tuple[PairedPoints, ...]] = None, ()
+
+    def of(self, document: ContactDocument) -> tuple[PairedPoints, ...]:
+        """The contacts of pairs on surfaces whose meshes are loaded, in the order of the document."""
+        if self._of[0] is not document:
+            found = (self._contact(document, name) for name in document.pairs)
+            self._of = document, tuple(contact for contact in found if contact is not None)
+        return self._of[1]
+
+    def _contact(self, document: ContactDocument, name: str) -> PairedPoints | None:
+        pair = document.pairs[name]
+        made_of: list[object] = [pair]
+        for end in (pair.manipulator, pair.object):
+            for patch in (end, *document.ancestors(end)):
+                made_of += [document.patch(patch), document.shape_of(patch)]
+            if document.surface(document.patch(end).surface).digest not in self._known:
+                return None
+        kept = self._kept.get(name)
+        if kept is not None and _same(kept[0], tuple(made_of)):
+            return kept[1]
+        found = self._geometry.of(document).pair(name)
+        contact = contact_of(found)
+        if kept is not None:  # the end that did not change keeps its identity, and so its track
+            before, now = kept[1], contact
+            mine = before.manipulator_points.same_as(now.manipulator_points)
+            theirs = before.object_points.same_as(now.object_points)
+            contact = replace(
+                now,
+                manipulator_points=before.manipulator_points if mine else now.manipulator_points,
+                object_points=before.object_points if theirs else now.object_points,
+            )
+        self._kept[name] = tuple(made_of), contact
+        return contact
 
 
 def _bodies(pins: tuple[Any, ...]) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ class InteractionSettings(HasSettings):
         "rest", help="what joints are pulled to: rest, the pose before each step, or that at the start of the drag"
     )
     prior_weight: float = setting(10.0, low=0.0, help="how strongly joints are pulled there")
-    iterations: int = setting(12, low=1, high=1000, help="steps of the solver while the pointer moves")
+    iterations: int = setting(4, low=1, high=1000, help="steps of the solver while the pointer moves")
     solver: str | None = setting(None, help="the pose solver while dragging; the core's own where none is named")
     held: tuple[str, ...] = setting((), help="joints that stay as they are, such as wrist")
     xray: bool = setting(False, help="see through the surface that tools do not work on")

@@ -12,7 +12,7 @@ from typing import Literal
 
 from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument
-from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.edit.document_geometry import DocumentGeometry, PairGeometry
 from contact_core.rig.rig import Pose, Rig
 from contact_core.scene.evaluated_rig import EvaluatedRig, HostRig
 from contact_core.solve.body import Body, PairedPoints
@@ -67,26 +67,27 @@ def problem_of(
             return Body.skinned(rigs[name], name=name, pose=pose or Pose.rest(rigs[name]), world_from_rig=world)
         return Body.rigid(name, geometry.mesh(name), world_from_surface=world)
 
-    contacts = tuple(
-        PairedPoints(
-            pair.pair.name,
-            pair.manipulator_surface,
-            pair.manipulator_points,
-            pair.object_surface,
-            pair.object_points,
-            pair.weights,
-            pair.pair.gain,
-        )
-        for pair in pairs
-    )
     return PoseProblem(
         tuple(map(body_of, names)),
-        contacts,
+        tuple(map(contact_of, pairs)),
         objective.terms,
         free=objective.free,
         held=objective.held,
         prior=objective.prior,
         limits=objective.limits,
+    )
+
+
+def contact_of(pair: PairGeometry) -> PairedPoints:
+    """A pair of the document as a contact of a problem."""
+    return PairedPoints(
+        pair.pair.name,
+        pair.manipulator_surface,
+        pair.manipulator_points,
+        pair.object_surface,
+        pair.object_points,
+        pair.weights,
+        pair.pair.gain,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.rig.rig import Rig
 from contact_core.rig.skinning import Track, normal_track, point_track, watched_track
 
 if TYPE_CHECKING:
@@ -61,7 +62,6 @@ def _tracks(
 ) -> tuple[Track, Track]:
     """Points and normals of one end of all pairs; what lies on one body is blended in one go."""
     owner = np.repeat([problem.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
-    points = SurfacePoints.concatenate([points for _, points in ends])
     order, tracks, normals = [], [], []
     for index in np.unique(owner):
         rows = np.flatnonzero(owner == index)
@@ -74,7 +74,30 @@ def _tracks(
             tracks.append(watched_track(start, len(rows), total, 4))
             normals.append(watched_track(start, len(rows), total, 3))
             continue
-        tracks.append(point_track(rig, points[rows], first))
-        normals.append(normal_track(rig, points[rows], first))
+        mine = [points for name, points in ends if problem.body_index(name) == index]
+        carried, turned = _carried(rig, first, mine, problem.kept_tracks)
+        tracks.append(carried)
+        normals.append(turned)
     back = np.argsort(np.concatenate(order))
     return Track.stacked(tracks).rows(back), Track.stacked(normals).rows(back)
+
+
+KeptTracks = MutableMapping[tuple[int, int], tuple[Rig, SurfacePoints, Track, Track]]
+
+
+def _carried(rig: Rig, first: int, batches: Sequence[SurfacePoints], kept: KeptTracks) -> tuple[Track, Track]:
+    """Tracks of batches of points on one body, and of their normals: those that a problem before this one made are
+    taken over. kept: by identity of the batch, which is kept beside its tracks so that its id stays its own."""
+    new = [batch for batch in batches if (id(batch), first) not in kept]
+    if len(new) == len(batches):  # all in one go
+        together = SurfacePoints.concatenate(batches)
+        points, normals = point_track(rig, together, first), normal_track(rig, together, first)
+        ends = np.cumsum([0, *map(len, batches)])
+        for k, batch in enumerate(batches):
+            rows = np.arange(ends[k], ends[k + 1])
+            kept[id(batch), first] = rig, batch, points.rows(rows), normals.rows(rows)
+        return points, normals
+    for batch in new:
+        kept[id(batch), first] = rig, batch, point_track(rig, batch, first), normal_track(rig, batch, first)
+    both = [kept[id(batch), first] for batch in batches]
+    return Track.stacked([each[2] for each in both]), Track.stacked([each[3] for each in both])

@@ -46,6 +46,7 @@ class PenetrationTerm(HasSettings):
     """
 
     summary: ClassVar[str] = "skin stays out of what is solid"
+    reads_contacts: ClassVar[bool] = False
     default_for: ClassVar[str] = "depth"
     weight: float = setting(5.0, low=0.0, help="how much it counts beside the other terms")
     samples: int = setting(1500, low=10, high=1_000_000, help="how many vertices stand for the skin of a body")

@@ -19,7 +19,7 @@ from contact_core.rig.skinning import Track
 from contact_core.solve.black_box import BlackBoxChart, BlackBoxMotion
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.extent import length_of
-from contact_core.solve.pairs import Pairs, pairs_of
+from contact_core.solve.pairs import KeptTracks, Pairs, pairs_of
 from contact_core.solve.state import PoseState
 from contact_core.solve.terms import BoundTerm, PoseTerm, paper_terms
 
@@ -229,6 +229,46 @@ class PoseProblem:
         bodies = tuple(replace(body, pose=poses[body.name]) for body in self.bodies)
         return replace(self, bodies=bodies, prior=prior, length=self.manipulator_length)
 
+    def continued(
+        self,
+        theta: FloatArray,
+        contacts: tuple[PairedPoints, ...],
+        terms: tuple[PoseTerm, ...],
+        bodies: tuple[Body, ...] | None = None,
+    ) -> PoseProblem:
+        """The problem with other contacts, terms or places, starting at theta (d,), at the cost of what is new.
+
+        For a drag: bodies are those of this one, moved at most, and so are charts, limits and lengths. Contacts
+        whose points are the same objects keep their tracks; a term that is the same object, and whose class says
+        `reads_contacts = False`, stays bound. The prior stays where it was; "current" is the new start. Raises
+        InvalidInput for black boxes, which know their contacts, and for other bodies.
+        """
+        moved = self.bodies if bodies is None else bodies
+        same = len(moved) == len(self.bodies) and all(
+            new.rig is old.rig and new.name == old.name and new.black_box is None
+            for new, old in zip(moved, self.bodies, strict=True)
+        )
+        if not same:
+            raise InvalidInput("a problem is continued with the same bodies, none of them a black box.")
+        result = replace(self, contacts=contacts, terms=terms, bodies=moved, length=self.manipulator_length)
+        kept = {name: getattr(self, name) for name in _KEPT}
+        stays = [
+            np.array_equal(a.world_from_rig, b.world_from_rig) for a, b in zip(moved, self.bodies, strict=True)
+        ]
+        if not all(stays):
+            kept["charts"] = tuple(
+                chart if stay else Chart(body.rig, body.world_from_rig)
+                for chart, stay, body in zip(self.charts, stays, moved, strict=True)
+            )
+            del kept["_still"]
+        if self.prior == "current":
+            del kept["prior_theta"]
+        ends = {id(end) for each in contacts for end in (each.manipulator_points, each.object_points)}
+        kept["kept_tracks"] = {key: made for key, made in self.kept_tracks.items() if key[0] in ends}
+        bound = tuple((t, self.bound_terms[t.name]) for t in self.terms if not getattr(t, "reads_contacts", True))
+        vars(result).update(kept, start=np.clip(theta, *self.limits_of_theta), _bound_before=bound)
+        return result
+
     # --- evaluation ---------------------------------------------------------------------------------------
 
     @cached_property
@@ -278,7 +318,20 @@ class PoseProblem:
         """The terms made ready, by name."""
         if len({term.name for term in self.terms}) != len(self.terms):
             raise InvalidInput(f"terms need unique names, but got {[term.name for term in self.terms]}.")
-        return {term.name: term.bind(self) for term in self.terms}
+        return {term.name: self._kept_term(term) or term.bind(self) for term in self.terms}
+
+    def _kept_term(self, term: PoseTerm) -> BoundTerm | None:
+        """The term as it was bound to the problem that this one continues."""
+        return next((bound for known, bound in self._bound_before if known is term), None)
+
+    @cached_property
+    def _bound_before(self) -> tuple[tuple[PoseTerm, BoundTerm], ...]:
+        return ()
+
+    @cached_property
+    def kept_tracks(self) -> KeptTracks:
+        """Tracks of points that lie still on their bodies, for the problems that continue this one."""
+        return {}
 
     @cached_property
     def _still(self) -> dict[int, Motion | BlackBoxMotion]:
@@ -340,6 +393,13 @@ class PoseProblem:
         """(d, d) the Gauss-Newton model of its second derivative."""
         d = len(state.theta)
         return sum((term.normal_matrix(state) for term in self.bound_terms.values()), np.zeros((d, d)))
+
+
+_KEPT = (  # by problems that continue another: all that neither contacts nor the start change
+    "charts", "is_rigid", "free_of_body", "dof_slices", "dof_names", "limits_of_theta", "is_translation", "is_root",
+    "scale", "prior_weights", "_charted", "_leftovers", "prior_theta", "bone_offsets", "watched_offsets",
+    "watched_dofs", "moves", "_still", "_moved_bones", "kept_tracks",
+)  # fmt: skip
 
 
 def _named(chart: Chart | BlackBoxChart, names: Iterable[str]) -> BoolArray:

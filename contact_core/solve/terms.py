@@ -47,6 +47,8 @@ class PoseTerm(Protocol):
     """One term of the objective (hook `contact_pose_terms`, which takes classes: a problem makes its own).
 
     Settings, the weight among them, are fields, see `contact_core.settings`; data such as solids are other fields.
+    A class whose `bind` reads neither the contacts nor the start may say `reads_contacts = False`: it then stays
+    bound while contacts are dragged (`PoseProblem.continued`).
     """
 
     @property

@@ -25,6 +25,7 @@ class SelfCollisionTerm(HasSettings):
     """Mean over a body's capsules of (depth / l)^2, summed over pairs that are apart at rest."""
 
     summary: ClassVar[str] = "parts of one body stay out of each other"
+    reads_contacts: ClassVar[bool] = False
     weight: float = setting(5.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "self-collision"
 

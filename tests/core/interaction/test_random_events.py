@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from contact_core.arrays import FloatArray
 from contact_core.document.schema import inconsistencies
-from contact_core.edit.announcer import DocumentChanged
+from contact_core.edit.listeners import DocumentChanged
 from contact_core.interaction.events import BUTTONS, KEY_NAMES, MODIFIERS, POINTER_KINDS, Event, Key, Pointer
 from contact_core.plugins.registry import TOOLS
 from contact_core.testing.artist import Artist, paired
