@@ -149,8 +149,8 @@ def drags(session: Session, copies: dict[str, str], moves: int, times: Times) ->
             times.measured((f"{what} edited", f"{what} solved"), handle, artist.advance)
         if tool == "move":
             off = artist.desk.scene.surfaces["hand"].points
-            while artist.advance() and artist.is_due:
-                artist.changes()
+            while artist.is_due:
+                artist.advance()
             off = off - artist.desk.scene.surfaces["hand"].points
             times.rows["off"] = [(1e3 * float(np.linalg.norm(off, axis=1).max()), 0.0)]
         assert tool == "paint" or "hand" in artist.desk.document.poses, artist.status

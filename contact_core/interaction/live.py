@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from contact_core.session import Session
 
 _STEPS_AT_RELEASE = 12
+_WORTH = 1e-3  # of the objective: a step that gains less is not seen, and the pose counts as settled
 
 
 class LiveSolve:
@@ -112,7 +113,8 @@ class LiveSolve:
         options = SolveOptions(max_iterations=self._desk.settings.iterations, candidates=("current",))
         solution = self._solver().solve(problem, options)
         self._theta = solution.theta
-        self._settled = solution.status is not SolveStatus.STOPPED
+        gained = solution.start_value - solution.value
+        self._settled = solution.status is not SolveStatus.STOPPED or gained <= _WORTH * solution.start_value
         return poses_of(solution, self._desk.session.rigs)
 
     def _problem(self, document: ContactDocument) -> PoseProblem | None:
