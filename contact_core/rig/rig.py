@@ -7,7 +7,8 @@ the rig's own space, in surface units; where a host places the rig in its scene 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -137,6 +138,23 @@ class Rig:
             raise InvalidInput(f"{self.name} has no joint {name!r}; near names: {', '.join(near)}.") from None
 
     @cached_property
+    def in_tree_order(self) -> Rig:
+        """The same rig with its joints in the order of `tree_order`."""
+        order = tree_order(self.parents)
+        if order == list(range(len(order))):
+            return self
+        place = np.argsort(order)  # (j,) new index of each joint
+        return replace(
+            self,
+            joints=tuple(self.joints[k] for k in order),
+            parents=np.where(self.parents >= 0, place[self.parents], -1)[order],
+            rest_local=self.rest_local[order],
+            bind_world=self.bind_world[order],
+            skin_joints=place[self.skin_joints],
+            freedoms=tuple(self.freedoms[k] for k in order),
+        )
+
+    @cached_property
     def rest_world(self) -> FloatArray:
         """(j, 4, 4) world_from_joint of the rest pose."""
         return forward_kinematics(self.parents, self.rest_local)
@@ -178,6 +196,22 @@ class Rig:
         return kept
 
 
+def tree_order(parents: Sequence[int] | IntArray) -> list[int]:
+    """The one order in which hosts give joints: depth first, children in the order in which the host has them.
+
+    parents: (j,) index of each joint's parent, -1 for a root. An armature of Blender knows no other order, so a rig
+    written breadth first comes the same way from there and from a stage.
+    """
+    children: dict[int, list[int]] = {}
+    for joint in reversed(range(len(parents))):
+        children.setdefault(int(parents[joint]), []).append(joint)
+    order, waiting = list[int](), children.get(-1, [])
+    while waiting:
+        order.append(waiting.pop())
+        waiting += children.get(order[-1], [])
+    return order
+
+
 def forward_kinematics(parents: IntArray, local: FloatArray) -> FloatArray:
     """(j, 4, 4) world_from_joint out of (j, 4, 4) parent_from_joint, parents first."""
     world = np.array(local, dtype=np.float64)
@@ -213,3 +247,8 @@ class Pose:
     @classmethod
     def rest(cls, rig: Rig) -> Pose:
         return cls(rig.joints, rig.rest_local)
+
+    def in_tree_order(self, parents: IntArray) -> Pose:
+        """The same pose with its joints, of which `parents` (j,) tells the tree, in the order of `tree_order`."""
+        order = tree_order(parents)
+        return Pose(tuple(self.joints[k] for k in order), self.local[order])

@@ -146,7 +146,7 @@ class MemoryHost(
 
     def read_rig(self, object_id: str) -> Asset:
         item = self._object(object_id)
-        rig = stretch_rig(item.rig, _placement(item), self.space())
+        rig = stretch_rig(item.rig.in_tree_order, _placement(item), self.space())
         return Asset(
             item.name,
             rig.surface,
@@ -160,7 +160,8 @@ class MemoryHost(
     def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
         check_frame(frame)
         item = self._object(object_id)
-        return stretch_pose(item.pose_at(frame), _placement(item).surface_from_local)
+        pose = item.pose_at(frame).in_tree_order(item.rig.parents)
+        return stretch_pose(pose, _placement(item).surface_from_local)
 
     def skin_points(self, object_id: str, pose: Pose) -> FloatArray:
         item = self._object(object_id)

@@ -13,6 +13,7 @@ from contact_core.testing.contract import Contract
 from contact_core.testing.host_clauses.documents import DocumentClauses
 from contact_core.testing.host_clauses.extras import ExtraClauses
 from contact_core.testing.host_clauses.ground import Build
+from contact_core.testing.host_clauses.orders import OrderClauses
 from contact_core.testing.host_clauses.rigs import RigClauses
 from contact_core.testing.host_clauses.scenes import SceneClauses
 from contact_core.testing.host_clauses.sessions import SessionClauses
@@ -22,7 +23,16 @@ __all__ = ["Build", "HostContract"]
 
 
 # pytest collects the bases from the last to the first, so this is the order of the clauses' numbers.
-class HostContract(SessionClauses, ExtraClauses, UndoClauses, DocumentClauses, RigClauses, SceneClauses, Contract):
+class HostContract(
+    OrderClauses,
+    SessionClauses,
+    ExtraClauses,
+    UndoClauses,
+    DocumentClauses,
+    RigClauses,
+    SceneClauses,
+    Contract,
+):
     """Fixture `build(scene)`: a host on a natively made scene. spaces: units and axes that the host can have."""
 
     about, letter = "host", "H"

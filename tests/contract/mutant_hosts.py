@@ -200,7 +200,7 @@ class TestWantsAScreen(Mutant, OnMemory):
 
 class TestTransposesRestFrames(Mutant, OnMemory):
     breaks = "H12"
-    consequences = ("H13", "H14", "H16", "H34")
+    consequences = ("H13", "H14", "H16", "H34", "H38")
 
     class Host(MemoryHost):
         def read_rig(self, object_id: str) -> Asset:
@@ -213,7 +213,7 @@ class TestTransposesRestFrames(Mutant, OnMemory):
 
 class TestBindsInTheWrongPose(Mutant, OnMemory):
     breaks = "H13"
-    consequences = ("H16",)  # another rest surface
+    consequences = ("H16", "H38")  # another rest surface
 
     class Host(MemoryHost):
         def read_rig(self, object_id: str) -> Asset:
@@ -586,3 +586,13 @@ class TestKnowsOneListener(Mutant, OnMemory):
         def on_undo(self, listener: Callable[[], None]) -> Callable[[], None]:
             self._listeners.clear()
             return super().on_undo(listener)
+
+
+class TestGivesJointsInItsOwnOrder(Mutant, OnMemory):
+    breaks = "H38"
+
+    class Host(MemoryHost):
+        def read_pose(self, object_id: str, frame: float | None = None) -> Pose:
+            pose = super().read_pose(object_id, frame)
+            order = [pose.joints.index(name) for name in self.scene.objects[object_id].rig.joints]
+            return Pose(tuple(pose.joints[k] for k in order), pose.local[order])

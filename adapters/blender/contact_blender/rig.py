@@ -23,7 +23,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
-from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics
+from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics, tree_order
 
 UNMOVED = "(unmoved)"  # the joint of vertices that no bone moves
 REST_BASIS = "contact_rest_basis"  # on a pose bone: the rest pose as an offset from the armature's own rest
@@ -33,7 +33,7 @@ _MATRIX_NOISE = 1e-6  # relative, of products of Blender's single precision worl
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Bones as joints, parents first. edit_local: (j, 4, 4) parent_from_joint of the armature's own rest, at which
+    """Bones as joints, depth first. edit_local: (j, 4, 4) parent_from_joint of the armature's own rest, at which
     the skin is bound; rest_local: (j, 4, 4) of the rest pose, which an exporter may have put elsewhere."""
 
     joints: tuple[str, ...]
@@ -72,7 +72,7 @@ def read_skeleton(armature: Any) -> Skeleton:
     """The bones of an armature. Raises InvalidInput where there are none, and in Edit Mode: the rest is in flux."""
     if armature.mode == "EDIT":
         raise InvalidInput(f"{armature.name} is in Edit Mode: leave it first, its bones are still being edited.")
-    bones = _parents_first(armature.data.bones)
+    bones = _depth_first(armature.data.bones)
     if not bones:
         raise InvalidInput(f"{armature.name} has no bones, so nothing of it can be posed.")
     index = {bone.name: place for place, bone in enumerate(bones)}
@@ -125,14 +125,11 @@ def _translates(armature: Any, bone: str) -> bool:
     return pose_bone.parent is None and not all(pose_bone.lock_location)
 
 
-def _parents_first(bones: Any) -> list[Any]:
-    """Blender's order, which is depth first, made sure of."""
-    done: dict[str, Any] = {}
-    waiting = list(bones)
-    while waiting:
-        done |= {bone.name: bone for bone in waiting if bone.parent is None or bone.parent.name in done}
-        waiting = [bone for bone in waiting if bone.name not in done]
-    return list(done.values())
+def _depth_first(bones: Any) -> list[Any]:
+    """The bones in the order in which every host gives joints."""
+    found = list(bones)
+    index = {bone.name: place for place, bone in enumerate(found)}
+    return [found[k] for k in tree_order([index[bone.parent.name] if bone.parent else -1 for bone in found])]
 
 
 def armature_from_mesh(scene_object: Any, armature: Any, depsgraph: Any) -> FloatArray:

@@ -154,6 +154,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         skeleton = binding.GetSkeleton()
         rest = skel.rest_local(cache, skeleton)
         local = Pose(skel.joint_names(skeleton), poses.local_pose(cache, skeleton, rest, frame))
+        local = local.in_tree_order(skel.parents_of(cache, skeleton))
         return stretch_pose(local, mesh.placement_of(skeleton.GetPrim()).surface_from_local)
 
     def skin_points(self, object_id: str, pose: Pose) -> FloatArray:

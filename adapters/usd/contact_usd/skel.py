@@ -85,7 +85,7 @@ def read_rig(cache: UsdSkel.Cache, binding: UsdSkel.Binding, space: SceneSpace) 
     parts = [_read_part(item, query) for item in skinned_meshes(binding)]
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     joints, weights, weight_notes = _influences(parts)
-    parents = np.asarray(query.GetTopology().GetParentIndices(), np.int64)
+    parents = parents_of(cache, skeleton)
     bind = _bind_world(query, prim)
     rest, rest_notes = _rest_local(skeleton, parents, bind)
     placement = placement_of(prim)
@@ -104,7 +104,7 @@ def read_rig(cache: UsdSkel.Cache, binding: UsdSkel.Binding, space: SceneSpace) 
             meters_per_unit=space.meters_per_unit,
             up_axis=space.up_axis,
         )
-        rig = stretch_rig(local, placement, space)
+        rig = stretch_rig(local.in_tree_order, placement, space)
     except InvalidInput as error:
         raise InvalidInput(f"{prim.GetPath()}: {error}") from error
     face_starts = np.cumsum([0, *(int(part.source_faces.max(initial=-1)) + 1 for part in parts)])
@@ -126,7 +126,12 @@ def rest_local(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> FloatArray:
     """(j, 4, 4) parent_from_joint of the rest pose, in skeleton space."""
     query = _query(cache, skeleton)
     bind = _bind_world(query, skeleton.GetPrim())
-    return _rest_local(skeleton, np.asarray(query.GetTopology().GetParentIndices(), np.int64), bind)[0]
+    return _rest_local(skeleton, parents_of(cache, skeleton), bind)[0]
+
+
+def parents_of(cache: UsdSkel.Cache, skeleton: UsdSkel.Skeleton) -> IntArray:
+    """(j,) index of each joint's parent, -1 for a root, in the skeleton's own order."""
+    return np.asarray(_query(cache, skeleton).GetTopology().GetParentIndices(), np.int64)
 
 
 def skin_of_stage(
