@@ -85,9 +85,9 @@ def _make(one: Figure, folder: Path, plugins: PluginManager, progress: Progress,
     one.draw(sheet)
     seconds = time.perf_counter() - began
     progress.tell(0.8, f"{one.title}: drawing")
-    renderer = _renderer(plugins)
+    renderer = best_renderer(plugins)
     pictures = [
-        _draw(renderer, row, folder / f"{one.name}-{place}.png", width)
+        draw_row(renderer, row, folder / f"{one.name}-{place}.png", width)
         for place, row in enumerate(sheet.rows, start=1)
     ]
     record = {
@@ -115,7 +115,7 @@ def _kept(path: Path) -> dict[str, Any] | None:
     return dict(kept)
 
 
-def _renderer(plugins: PluginManager) -> Renderer:
+def best_renderer(plugins: PluginManager) -> Renderer:
     """The best renderer that works here."""
     working = [one for one in plugins.offers(RENDERERS).values() if one.unavailable() is None]
     if not working:
@@ -123,7 +123,7 @@ def _renderer(plugins: PluginManager) -> Renderer:
     return max(working, key=lambda one: one.priority)
 
 
-def _draw(renderer: Renderer, row: Row, path: Path, width: int) -> Path:
+def draw_row(renderer: Renderer, row: Row, path: Path, width: int) -> Path:
     """A row as one image: JPEG where Pillow is there (extra `viewer`), else the renderer's PNG."""
     count = len(row.pictures)
     height = int(min(TALLEST * width, width / count / row.aspect))

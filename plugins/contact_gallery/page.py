@@ -27,7 +27,15 @@ def page(made: Sequence[tuple[Figure, Mapping[str, Any]]]) -> str:
 
 
 def _overview(made: Sequence[tuple[Figure, Mapping[str, Any]]]) -> list[str]:
-    lines = ["| figure | of the paper | seconds | operations |", "|---|---|---|---|"]
+    lines = ['<div class="grid cards" markdown>', ""]
+    for figure, record in made:
+        lines += [
+            f"-   [![{figure.title}](gallery/{record['pictures'][-1]})](#{figure.name})",
+            "",
+            f"    {figure.title}",
+            "",
+        ]
+    lines += ["</div>", "", "| figure | of the paper | seconds | operations |", "|---|---|---|---|"]
     for figure, record in made:
         cost = record["operations"] or ""
         lines.append(f"| [{figure.title}](#{figure.name}) | {figure.paper} | {record['seconds']:.1f} | {cost} |")
