@@ -13,7 +13,7 @@ READY := $(VENV)/.ready
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test explore test-blender-all lint typecheck pytest wheel matrix bench docs contract-report clean
+.PHONY: help demo gallery test explore test-blender-all lint typecheck pytest wheel matrix bench docs contract-report clean
 
 help:
 	@echo "make demo | test | lint | bench | docs | clean"
@@ -27,6 +27,11 @@ $(READY): pyproject.toml
 
 demo: $(READY)
 	$(BIN)/contact demo --out $(OUT)/demo
+
+# The pages with pictures: docs/gallery.md, and those of docs/tutorial.md.
+gallery: $(READY)
+	$(BIN)/contact gallery --all --out docs
+	$(BIN)/python .ci/tutorial.py
 
 lint: $(READY)
 	$(BIN)/ruff check .
