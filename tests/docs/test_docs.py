@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import pkgutil
 import re
 import shutil
 import subprocess
@@ -219,3 +220,16 @@ def test_every_example_script_runs(script: Path, tmp_path: Path) -> None:
     run = subprocess.run([sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr[-2000:]
     assert run.stdout.strip()
+
+
+NAMED = re.compile(r"`(contact_core(?:\.\w+)+)`")
+
+
+def test_what_the_architecture_names_exists_and_its_picture_is_current() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    names = NAMED.findall(text)
+    assert len(names) > 20
+    for name in names:
+        assert pkgutil.resolve_name(name) is not None, name
+    checked = subprocess.run([sys.executable, str(ROOT / ".ci" / "floors.py"), "--check"], check=False)
+    assert checked.returncode == 0, "run python .ci/floors.py: the floors have changed"
