@@ -32,10 +32,9 @@ from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_core.arrays import FloatArray
 from contact_core.geometry.inside import depth_inside
 from contact_core.geometry.transform import transform_points
+from contact_core.job.job import Job
 from contact_core.job.recipe_reader import load_recipe
-from contact_core.job.run import prepare
-from contact_core.job.solving import settings_of
-from contact_core.job.workpiece import Job
+from contact_core.job.run import prepare, settings_of
 from contact_core.plugins.manager import PluginManager
 from contact_core.rig.rig import skin
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
@@ -65,9 +64,12 @@ class Grip:
     def depth(self, problem: PoseProblem, theta: FloatArray) -> float:
         """Of the deepest skin vertex in the true solids, in % of the length: no grid comes in between."""
         state = problem.state(theta)
-        into = np.linalg.inv(self.job.placed)
-        points = transform_points(into, skin(self.job.rig, state.motions[0].world))
-        deepest = max(depth_inside(points, solid).max() for solid in self.job.solids or (self.job.object.mesh,))
+        into = np.linalg.inv(self.job.session.document.surface("object").world_from_surface)
+        points = transform_points(into, skin(self.job.session.rigs["manipulator"], state.motions[0].world))
+        deepest = max(
+            depth_inside(points, solid).max()
+            for solid in self.job.solids["object"] or (self.job.assets["object"].mesh,)
+        )
         return 100.0 * float(deepest) / problem.manipulator_length
 
 

@@ -14,10 +14,10 @@ from harness import record
 
 import contact_builtins
 from contact_builtins.demos import demo_recipe
+from contact_core.job.job import Job
 from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import perform
-from contact_core.job.workpiece import OBJECT, Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.proposals import PENALTY, SLACK
 from contact_core.proposals.draft import Draft
@@ -75,7 +75,8 @@ def _times(job: Job) -> tuple[float, float]:
     """Milliseconds of a slide from the solved pose: of this process, and by the clock."""
     took = []
     settings = SolveSettings(
-        objective=Objective(job.solution.problem.terms), solids={OBJECT: job.solids} if job.solids else {}
+        objective=Objective(job.solution.problem.terms),
+        solids={name: solids for name, solids in job.solids.items() if solids},
     )
     for _ in range(TIMED + 1):
         draft = Draft(job.session.document, job.session.derived, job.session.rigs)

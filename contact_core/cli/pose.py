@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from contact_core.cli.output import Output, columns
 
 if TYPE_CHECKING:
-    from contact_core.job.workpiece import JobResult
+    from contact_core.job.job import JobResult
 
 
 class Pose:

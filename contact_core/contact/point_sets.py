@@ -1,4 +1,4 @@
-"""Sets of painted points: each place once, and split where the surface is not connected."""
+"""Sets of painted points: disks, each place once, and split where the surface is not connected."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numpy as np
 from contact_core.arrays import FloatArray, frozen
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tracing import trace_geodesic
+
+_GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
 def without_doubles(
@@ -45,3 +48,14 @@ def connected_parts(mesh: TriangleMesh, points: SurfacePoints) -> list[SurfacePo
     part = part_of_vertex[mesh.faces[points.faces, 0]]  # (n,)
     _, first = np.unique(part, return_index=True)
     return [points[np.flatnonzero(part == part[k])] for k in np.sort(first)]
+
+
+def geodesic_disk(mesh: TriangleMesh, centre: SurfacePoints, radius: float, count: int) -> SurfacePoints:
+    """`count` points within a geodesic radius of a point (one, as a batch), evenly spread, the centre first.
+
+    The exponential map of a sunflower: its ring i lies at radius sqrt(i / (count - 1)), so equal areas carry equal
+    numbers of points.
+    """
+    place = np.arange(count)
+    spokes = radius * np.sqrt(place / max(count - 1, 1)) * np.exp(1j * _GOLDEN_ANGLE * place)  # (n,)
+    return trace_geodesic(mesh, centre[np.zeros(count, np.int64)], spokes).points

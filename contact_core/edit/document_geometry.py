@@ -24,7 +24,8 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.rig.bones import bones_of
-from contact_core.rig.rig import Rig, forward_kinematics, skin
+from contact_core.rig.poses import posed_points
+from contact_core.rig.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +78,7 @@ class DocumentGeometry:
             return self.mesh(surface)
         if rig is None:
             raise InvalidInput(f"the rig of {surface!r} is not loaded: give it to the session by surfaces.add.")
-        local = rig.rest_local.copy()
-        for joint, matrix in zip(pose.joints, pose.local, strict=True):
-            local[rig.joint_index(joint)] = matrix
-        return self.mesh(surface).with_points(skin(rig, forward_kinematics(rig.parents, local)))
+        return self.mesh(surface).with_points(posed_points(rig, pose))
 
     def touching(
         self, surface: str, other: str, distance: float, *, facing: bool = True, smallest: int = 3

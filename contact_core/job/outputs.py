@@ -13,37 +13,50 @@ from contact_core.atomic_file import write_atomic
 from contact_core.atomic_set import replacing_set
 from contact_core.document.schema import dump_document
 from contact_core.errors import ContactError
+from contact_core.job.inputs import inputs_of
+from contact_core.job.job import Job, JobResult
 from contact_core.job.pictures import pictures_of
-from contact_core.job.report import DEFINITIONS, SCHEMA, inputs_of, table
-from contact_core.job.workpiece import Job, JobResult
+from contact_core.job.recipe import Recipe
+from contact_core.job.report import DEFINITIONS, SCHEMA, table
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS, RENDERERS
+from contact_core.rig.pose_files import save_pose
+from contact_core.rig.poses import moved_roots
 from contact_core.rig.rig import Pose
 from contact_core.scene.picture import Picture
 
-# What a job leaves, by role; a picture only where something can draw it.
-FILES = {
-    "document": "document.json",
-    "pose": "pose.json",
-    "model": "posed.glb",
-    "picture": "picture.png",
-    "report": "report.json",
-}
+
+def files_of(recipe: Recipe) -> dict[str, str]:
+    """What a job leaves, by role; a picture only where something can draw it. Of several manipulators each has a
+    pose of its own."""
+    names = [spec.name for spec in recipe.manipulators]
+    poses = {f"pose of {name}": f"pose.{number}.json" for number, name in enumerate(names, start=1)}
+    return {
+        "document": "document.json",
+        **(poses if len(names) > 1 else {"pose": "pose.json"}),
+        "model": "posed.glb",
+        "picture": "picture.png",
+        "report": "report.json",
+    }
 
 
 def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
     """Draw and write everything. Raises FileRefused where `out` cannot be written."""
     rows = table(job.metrics, job.verdict)
-    with replacing_set(out, FILES.values()) as stage:
+    files = files_of(job.recipe)
+    poses = [(role, name) for role, name in files.items() if role.startswith("pose")]
+    with replacing_set(out, files.values()) as stage:
         with job.stage("write", 0.75, "Writing the document, the pose and the model"):
-            write_atomic(stage / FILES["document"], dump_document(job.session.timed_document))
-            write_atomic(stage / FILES["pose"], pose_json(job.rig.name, job.pose))
-            _write_model(job, stage / FILES["model"], plugins)
+            write_atomic(stage / files["document"], dump_document(job.session.timed_document))
+            for spec, (_, name) in zip(job.recipe.manipulators, poses, strict=True):
+                pose = job.session.document.poses[spec.name]
+                save_pose(stage / name, pose, rig=job.session.rigs[spec.name].name)
+            _write_model(job, stage / files["model"], plugins)
         with job.stage("render", 0.8, "Drawing the pictures"):
-            renderer = draw(job, pictures_of(job, rows), stage / FILES["picture"], plugins)
+            renderer = draw(job, pictures_of(job, rows), stage / files["picture"], plugins)
         report = report_of(job, renderer)
-        write_atomic(stage / FILES["report"], json.dumps(report, indent=2, allow_nan=False) + "\n")
-        written = {role: out / name for role, name in FILES.items() if (stage / name).exists()}
+        write_atomic(stage / files["report"], json.dumps(report, indent=2, allow_nan=False) + "\n")
+        written = {role: out / name for role, name in files.items() if (stage / name).exists()}
         job.progress.tell(1.0, "Finishing")  # the last moment to cancel: from here on the files are written
     return JobResult(job.recipe, report, job.verdict, written, rows)
 
@@ -63,31 +76,24 @@ def draw(job: Job, pictures: list[Picture], path: Path, plugins: PluginManager) 
 
 
 def _write_model(job: Job, path: Path, plugins: PluginManager) -> None:
-    """A model with the manipulator in its pose and the object where it lies, by the format that writes .glb."""
+    """A model with every manipulator in its pose and every object where it lies, by the format that writes .glb."""
     writers = [f for f in plugins.offers(FORMATS).values() if f.can_write and ".glb" in f.suffixes]
     if not writers:
         job.notes.append("no plugin writes .glb, so there is no posed model.")
         return
-    standing = Pose((job.object.name,), job.placed[None])
-    poses = {job.manipulator.name: job.pose, job.object.name: standing}
-    writers[0].write(path, [job.manipulator, job.object], poses)
-
-
-def pose_json(rig: str, pose: Pose) -> str:
-    """Local joint transforms by name: parent_from_joint, rows of a 4 x 4 matrix, column vectors, surface units."""
-    joints = {name: local.tolist() for name, local in zip(pose.joints, pose.local, strict=True)}
-    head = {
-        "schema": "contact.pose",
-        "version": 1,
-        "rig": rig,
-        "matrix": "parent_from_joint, 4 rows, column vectors",
-    }
-    return json.dumps({**head, "joints": joints}, indent=1) + "\n"
+    document = job.session.document
+    poses: dict[str, Pose] = {}
+    for name, asset in job.assets.items():
+        world = document.surface(name).world_from_surface
+        poses[asset.name] = Pose((asset.name,), world[None])
+        if asset.rig is not None:
+            poses[asset.name] = moved_roots(asset.rig, document.poses[name], world)
+    writers[0].write(path, list(job.assets.values()), poses)
 
 
 def report_of(job: Job, renderer: str | None) -> dict[str, Any]:
     """The content of report.json."""
-    metrics = dict(job.metrics)
+    metrics, first = dict(job.metrics), job.recipe.manipulators[0].name
     return _finite(
         {
             "schema": "contact.report",
@@ -102,15 +108,15 @@ def report_of(job: Job, renderer: str | None) -> dict[str, Any]:
             **{key: metrics[key] for key in metrics if key != "patches"},
             "limits": dict(job.verdict.limits),
             "patches": metrics["patches"],
-            "left_out": dict(job.placement.left_out),
+            "left_out": dict(job.left_out),
             "dofs": len(job.solution.theta),
             "iterations": len(job.solution.trace),
             "status": job.solution.status.name.lower(),
             "message": job.solution.message,
             "trace": [float(value) for value in job.solution.trace],
-            "start_distance": job.start_distance / job.length,
-            "manipulator_length": job.length,
-            "meters_per_unit": job.rig.meters_per_unit,
+            "start_distance": min(job.start_distance[name] / job.length(name) for name in job.start),
+            "manipulator_length": job.length(first),
+            "meters_per_unit": job.session.rigs[first].meters_per_unit,
             "renderer": renderer,
             "seconds": {key: round(value, 4) for key, value in job.seconds.items()},
             "notes": list(job.notes),

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from contact_core.arrays import FloatArray
-from contact_core.job.scene import moved, posed_skin
-from contact_core.job.workpiece import Job
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.transform import transform_points
+from contact_core.job.job import Job
+from contact_core.rig.poses import posed_points
 from contact_core.rig.rig import Pose
 from contact_core.scene.picture import Picture, PictureMesh
 
 SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 LINES_PER_PATCH = 14
 THROUGH = 0.25  # opacity of the hand that one looks through
-NEAR = 0.4  # of the length: how much of the object round the contacts is in the frame
+NEAR = 0.4  # of the length: how much of the objects round the contacts is in the frame
 
 Rows = tuple[tuple[str, str, bool], ...]
 
@@ -24,44 +27,57 @@ Rows = tuple[tuple[str, str, bool], ...]
 def pictures_of(job: Job, rows: Rows) -> list[Picture]:
     """The open hand away from the object, with the contacts painted on both and the table of results; the solved
     pose; and the same through the hand, so that one sees where it touches."""
-    away = job.start_distance / job.length
+    document = job.session.document
+    away = min(job.start_distance[name] / job.length(name) for name in job.start)
     before = f"{job.recipe.title or job.recipe.name}: before, {away:.1f} lengths away" if away else "before"
     verdict = "a grasp" if job.verdict.is_grasp else "NOT a good grasp"
     after = f"after: {job.metrics['contacts']} contact points, {len(job.solution.theta)} dofs"
-    legend = tuple((name, job.session.document.patch(name).color) for name in job.session.document.pairs)
+    legend = tuple((name, document.patch(name).color) for name in document.pairs)
     judged = (("solved pose", verdict, not job.verdict.is_grasp), *rows)
-    posed = _picture(job, job.pose, after)
-    skin, thing = posed.meshes
+    posed = _picture(job, document.poses, after)
+    through = tuple(replace(mesh, opacity=THROUGH) if mesh.color == SKIN else mesh for mesh in posed.meshes)
     return [
         replace(_picture(job, job.start, before), table=judged, legend=legend),
         posed,
-        replace(posed, meshes=(replace(skin, opacity=THROUGH), thing), caption="where it touches"),
+        replace(posed, meshes=through, caption="where it touches"),
     ]
 
 
-def _picture(job: Job, pose: Pose, caption: str) -> Picture:
-    skin = posed_skin(job.rig, pose)
-    thing = moved(job.object.mesh, job.placed)
+def _picture(job: Job, poses: Mapping[str, Pose], caption: str) -> Picture:
+    meshes = {name: _standing(job, name, poses) for name in job.assets}
     points, lines = [], []
     for pair in job.session.geometry.pairs():
         color = job.session.document.patch(pair.pair.manipulator).color
-        here, there = pair.manipulator_points.positions(skin), pair.object_points.positions(thing)
+        here = pair.manipulator_points.positions(meshes[pair.manipulator_surface])
+        there = pair.object_points.positions(meshes[pair.object_surface])
         points += [(here, color), (there, color)]
         chosen = np.unique(np.linspace(0, len(here) - 1, LINES_PER_PATCH).astype(int))
         lines.append((np.stack([here[chosen], there[chosen]], axis=1), color))
     view = job.recipe.view
     return Picture(
-        meshes=(PictureMesh(skin, SKIN), PictureMesh(thing, THING)),
+        meshes=tuple(PictureMesh(mesh, SKIN if name in poses else THING) for name, mesh in meshes.items()),
         points=tuple(points),
         lines=tuple(lines),
         camera_from=view.camera_from,
         up=view.up,
         caption=caption,
-        focus=_focus(skin.points, thing.points, np.concatenate([line[:, 1] for line, _ in lines]), job.length),
+        focus=_focus(job, meshes, poses, np.concatenate([line[:, 1] for line, _ in lines])),
     )
 
 
-def _focus(skin: FloatArray, thing: FloatArray, touched: FloatArray, length: float) -> FloatArray:
-    """(k, 3) the manipulator and the part of the object near the contacts: of a pole, where the hand holds it."""
-    distance, _ = cKDTree(touched).query(thing)
-    return np.concatenate([skin, thing[distance < NEAR * length]])
+def _standing(job: Job, name: str, poses: Mapping[str, Pose]) -> TriangleMesh:
+    """A surface in world space, in its pose where it has one."""
+    mesh, rig = job.session.geometry.mesh(name), job.session.rigs.get(name)
+    points = posed_points(rig, poses[name]) if rig is not None else mesh.points
+    return mesh.with_points(transform_points(job.session.document.surface(name).world_from_surface, points))
+
+
+def _focus(
+    job: Job, meshes: Mapping[str, TriangleMesh], poses: Mapping[str, Pose], touched: FloatArray
+) -> FloatArray:
+    """(k, 3) the manipulators and the parts of objects near the contacts: of a pole, where the hand holds it."""
+    near = NEAR * max(map(job.length, poses))
+    skins = [mesh.points for name, mesh in meshes.items() if name in poses]
+    things = np.concatenate([mesh.points for name, mesh in meshes.items() if name not in poses])
+    distance, _ = cKDTree(touched).query(things)
+    return np.concatenate([*skins, things[distance < near]])

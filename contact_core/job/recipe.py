@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from contact_core.job.table import Vector
+from contact_core.strict_table import Vector
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,13 @@ class RootSpec:
 class PatchSpec:
     """One patch on the manipulator. Exactly one of vertices, positions, disk holds its points.
 
-    axis: two or more points to draw it through, else the generator named. place: overrides the placer.
+    axis: two or more points to draw it through, else the generator named. place: overrides the placer. on, onto:
+    the manipulator that it is painted on, and the object that it goes to; the first of each by default.
     """
 
     name: str
+    on: str | None = None
+    onto: str | None = None
     vertices: tuple[int, ...] = ()
     positions: tuple[Vector, ...] = ()
     disk: DiskSpec | None = None
@@ -75,30 +78,35 @@ class PatchSpec:
 
 
 @dataclass(frozen=True)
+class ManipulatorSpec:
+    """What is posed. name: of its surface in the document. position, rotation: where its rig stands, in world space
+    (degrees about x, y, z, in this order). pose: roughly, per joint or pattern, degrees per rotation dof.
+    """
+
+    source: AssetSource
+    name: str = "manipulator"
+    position: Vector = (0.0, 0.0, 0.0)
+    rotation: Vector = (0.0, 0.0, 0.0)
+    pose: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class ObjectSpec:
-    """The object. scale: of its file. solids: which insides count for depth; see `metrics.PosedScene`.
+    """What is touched. name: of its surface in the document. scale: of its file. center: where the middle of its
+    bounding box lies in world space, roughly: the artist's part. rotation: degrees about x, y, z, in this order.
+    solids: which insides count for depth; see `metrics.PosedScene`.
 
     fill_low, fill_high: the hull is taken of the points within this box of the object's surface space.
     """
 
     source: AssetSource
+    name: str = "object"
     scale: float = 1.0
+    center: Vector = (0.0, 0.0, 0.0)
+    rotation: Vector = (0.0, 0.0, 0.0)
     solids: tuple[str, ...] = ("surface",)
     fill_low: Vector | None = None
     fill_high: Vector | None = None
-
-
-@dataclass(frozen=True)
-class CoarseSpec:
-    """How the object lies in the manipulator's hand, roughly: the artist's part.
-
-    object_center: of the object's bounding box, in rig space. object_rotation: degrees about x, y, z of rig
-    space, in this order. pose: per joint or pattern, degrees per rotation dof.
-    """
-
-    object_center: Vector = (0.0, 0.0, 0.0)
-    object_rotation: Vector = (0.0, 0.0, 0.0)
-    pose: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -130,16 +138,16 @@ class ViewSpec:
 
 @dataclass(frozen=True)
 class Recipe:
-    """A whole job. folder: where relative file names are looked up first."""
+    """A whole job. World space is that of the rigs as their files have them. folder: where relative file names are
+    looked up first."""
 
     name: str
-    manipulator: AssetSource
-    object: ObjectSpec
+    manipulators: tuple[ManipulatorSpec, ...]
+    objects: tuple[ObjectSpec, ...]
     patches: tuple[PatchSpec, ...]
     title: str = ""
     away: float = 1.25
     away_direction: Vector | None = None
-    coarse: CoarseSpec = field(default_factory=CoarseSpec)
     placer: str | None = None  # the default for recipes
     placer_options: Mapping[str, Any] = field(default_factory=dict)
     solve: SolveSpec = field(default_factory=SolveSpec)

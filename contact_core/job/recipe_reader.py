@@ -9,8 +9,8 @@ from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.job.recipe import (
     ACCEPT,
     AssetSource,
-    CoarseSpec,
     DiskSpec,
+    ManipulatorSpec,
     ObjectSpec,
     PatchSpec,
     PointSpec,
@@ -19,7 +19,7 @@ from contact_core.job.recipe import (
     SolveSpec,
     ViewSpec,
 )
-from contact_core.job.table import Table, parse_toml
+from contact_core.strict_table import Table, parse_toml
 
 SCHEMA = 1
 _LARGEST_FILE = 4_000_000  # bytes
@@ -58,12 +58,11 @@ def _recipe(top: Table, folder: Path | None) -> Recipe:
     recipe = Recipe(
         name=top.text("name"),
         title=top.text("title", ""),
-        manipulator=_source(top.table("manipulator"), sidecar=True),
-        object=_object(top.table("object")),
+        manipulators=tuple(_manipulator(table) for table in top.one_or_more("manipulator")),
+        objects=tuple(_object(table) for table in top.one_or_more("object")),
         patches=tuple(spec for table in top.tables("patch") for spec in _patches(table)),
         away=scene.number("away", 1.25, at_least=0.0, at_most=100.0),
         away_direction=scene.vector("direction", None, direction=True),
-        coarse=_coarse(top.table("coarse", None)),
         placer=placer.text("name", None),
         placer_options={key: placer.raw(key) for key in placer.values if key != "name"},
         solve=_solve(top.table("solve", None)),
@@ -73,14 +72,25 @@ def _recipe(top: Table, folder: Path | None) -> Recipe:
     )
     scene.done()
     top.done()
-    names = [patch.name for patch in recipe.patches]
-    if len(set(names)) != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidInput(f"patch names must be unique, but {twice!r} comes twice.")
+    _check_names(recipe)
     return recipe
 
 
-def _source(table: Table, *, sidecar: bool = False, done: bool = True) -> AssetSource:
+def _check_names(recipe: Recipe) -> None:
+    """Names are unique, and patches name manipulators and objects that there are. Raises InvalidInput."""
+    manipulators = [spec.name for spec in recipe.manipulators]
+    objects = [spec.name for spec in recipe.objects]
+    for kind, names in (("patch", [spec.name for spec in recipe.patches]), ("surface", manipulators + objects)):
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise InvalidInput(f"{kind} names must be unique, but {twice!r} comes twice.")
+    for patch in recipe.patches:
+        for key, name, known in (("on", patch.on, manipulators), ("onto", patch.onto, objects)):
+            if name is not None and name not in known:
+                raise InvalidInput(f"patch {patch.name!r}: {key} is one of {', '.join(known)}, but got {name!r}.")
+
+
+def _source(table: Table, *, sidecar: bool = False) -> AssetSource:
     kind = table.exactly_one("file", "sample")
     value, digest = table.text(kind), table.text("sha256", None)
     if digest is not None and (
@@ -88,13 +98,24 @@ def _source(table: Table, *, sidecar: bool = False, done: bool = True) -> AssetS
     ):
         raise InvalidInput(f"{table.where}.sha256 must be 64 hex digits and goes with a file.")
     beside = table.text("rig", None) if sidecar else None
-    if done:
-        table.done()
     if kind == "sample":
         if beside is not None:
             raise InvalidInput(f"{table.where}.rig goes with a file; the sample {value!r} has its own limits.")
         return AssetSource(sample=value)
     return AssetSource(file=value, sha256=digest and digest.lower(), sidecar=beside)
+
+
+def _manipulator(table: Table) -> ManipulatorSpec:
+    pose = table.table("pose", None)
+    spec = ManipulatorSpec(
+        source=_source(table, sidecar=True),
+        name=table.text("name", "manipulator"),
+        position=table.vector("position", (0.0, 0.0, 0.0)),
+        rotation=table.vector("rotation", (0.0, 0.0, 0.0)),
+        pose={joint: _angles(pose, joint) for joint in pose.values},
+    )
+    table.done()
+    return spec
 
 
 def _object(table: Table) -> ObjectSpec:
@@ -104,7 +125,10 @@ def _object(table: Table) -> ObjectSpec:
             raise InvalidInput(f"{table.where}.solids holds 'surface' and 'hull', but got {kind!r}.")
     box = table.table("hull_box", None)
     spec = ObjectSpec(
-        source=_source(table, done=False),
+        source=_source(table),
+        name=table.text("name", "object"),
+        center=table.vector("center", (0.0, 0.0, 0.0)),
+        rotation=table.vector("rotation", (0.0, 0.0, 0.0)),
         scale=table.number("scale", 1.0, above=0.0, at_most=1e6),
         solids=solids,
         fill_low=box.vector("low", None),
@@ -141,6 +165,8 @@ def _patch(table: Table, name: str, joint: str | None) -> PatchSpec:
     place = table.table("place") if "place" in table else None
     spec = PatchSpec(
         name=name,
+        on=table.text("on", None),
+        onto=table.text("onto", None),
         vertices=table.counts("vertices", ()),
         positions=table.vectors("positions", ()),
         disk=disk,
@@ -182,17 +208,6 @@ def _root(table: Table) -> RootSpec:
         root=_point(table.table("root"), None),
         direction=table.vector("direction", direction=True) if kind == "direction" else None,
         aim=_point(table.table("aim"), None) if kind == "aim" else None,
-    )
-    table.done()
-    return spec
-
-
-def _coarse(table: Table) -> CoarseSpec:
-    pose = table.table("pose", None)
-    spec = CoarseSpec(
-        object_center=table.vector("object_center", (0.0, 0.0, 0.0)),
-        object_rotation=table.vector("object_rotation", (0.0, 0.0, 0.0)),
-        pose={joint: _angles(pose, joint) for joint in pose.values},
     )
     table.done()
     return spec

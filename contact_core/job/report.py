@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
-from contact_core.errors import FileRefused
-from contact_core.job.assets import find_file
-from contact_core.job.recipe import ACCEPT, AssetSource, Recipe
+from contact_core.job.recipe import ACCEPT
 
 SCHEMA = 1
 _PER_LENGTH = ("mean_contact_distance", "p95_contact_distance", "gap", "max_penetration")
@@ -116,23 +111,3 @@ def table(metrics: Mapping[str, Any], verdict: Verdict) -> tuple[tuple[str, str,
         for key in ACCEPT
     ]
     return (*rows, *((name, why, True) for name, why in verdict.failed_patches.items()))
-
-
-def inputs_of(recipe: Recipe) -> dict[str, dict[str, str]]:
-    """What a result was made from, by role: the SHA-256 of the recipe's content and of each file, or the sample."""
-    content = json.dumps({**asdict(recipe), "folder": None}, sort_keys=True).encode()
-    found = {"recipe": {"name": recipe.name, "sha256": hashlib.sha256(content).hexdigest()}}
-    for role, source in (("manipulator", recipe.manipulator), ("object", recipe.object.source)):
-        found[role] = {"sample": source.sample} if source.sample else _file_facts(source, recipe.folder)
-        if source.sidecar is not None:
-            path = (recipe.folder or Path.cwd()) / source.sidecar
-            found[f"{role} rig"] = {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-    return found
-
-
-def _file_facts(source: AssetSource, folder: Path | None) -> dict[str, str]:
-    try:
-        path = find_file(source, folder)
-        return {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-    except (FileRefused, OSError):  # it was read a moment ago, and is gone
-        return {"file": str(source.file)}

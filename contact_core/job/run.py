@@ -1,13 +1,14 @@
 """The job: from a recipe to painted contacts, transferred contacts, a solved pose, pictures and a report.
 
-Everything goes through a `Session`, so the document that comes out has the history of an artist's work. Targets
-come from the recipe and its placer; a solved pose never places them, unless the recipe asks to settle or slide
-contacts.
+Every step is a call of a `Session` that a user could make, so the document that comes out has the history of an
+artist's work. Targets come from the recipe and its placer; a solved pose never places them, unless the recipe asks
+to settle or slide contacts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,23 +18,30 @@ from contact_core.atomic_set import check_writable
 from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job.assets import object_mesh, read_source, solids_of
-from contact_core.job.metrics import Contact, PosedScene, measure
-from contact_core.job.outputs import FILES, write_outputs
-from contact_core.job.painting import axis_picks, explicit_root, paint
-from contact_core.job.recipe import Recipe
+from contact_core.job.inputs import object_mesh, read_source, solids_of
+from contact_core.job.job import Job, JobResult
+from contact_core.job.measuring import judged, measured
+from contact_core.job.outputs import files_of, write_outputs
+from contact_core.job.points import axis_points, painted_points, target_root
+from contact_core.job.recipe import PatchSpec, Recipe
 from contact_core.job.recipe_reader import load_recipe
-from contact_core.job.report import judge
-from contact_core.job.scene import away_pose, coarse_pose, posed_skin, posed_world, world_from_object
-from contact_core.job.solving import move_contacts, solve
-from contact_core.job.workpiece import HAND, OBJECT, Job, JobResult
+from contact_core.job.standing import backed_off, world_from_manipulator, world_from_object
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import PLACERS
+from contact_core.plugins.registry import AXIS_GENERATORS, PLACERS, POSE_TERMS
 from contact_core.plugins.slots import PlacementRequest, PlacementResult
 from contact_core.progress import NO_PROGRESS, Progress
-from contact_core.rig.bones import bone_segments
+from contact_core.proposals.proposal import AGAIN, Proposal, SolveSettings
+from contact_core.rig.poses import curled
 from contact_core.rig.rig import Pose
+from contact_core.scene.problem import Objective
 from contact_core.session import Session
+from contact_core.settings import configured
+from contact_core.settings import settings_of as declared_by
+from contact_core.solve.solver import SolveOptions, SolveStatus
+from contact_core.solve.terms import PoseTerm, paper_terms
+
+SOLVE, MOVE, MEASURE = 0.45, 0.55, 0.7  # where these begin, as fractions of the job
+COMMON = tuple(each.name for each in declared_by(SolveOptions))
 
 
 def run_recipe(
@@ -50,12 +58,12 @@ def run(
     plugins: PluginManager | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> JobResult:
-    """Run a recipe and write document, pose, posed model, pictures and report into `out`.
+    """Run a recipe and write document, poses, posed model, pictures and report into `out`.
 
     Raises ContactError; Cancelled when progress raises it. Then nothing is written.
     """
     plugins, out = plugins or PluginManager(), Path(out)
-    check_writable(out, FILES.values())  # before the work, not after it
+    check_writable(out, files_of(recipe).values())  # before the work, not after it
     try:
         return write_outputs(perform(recipe, plugins, progress=progress), out, plugins)
     except Cancelled as cancelled:
@@ -65,132 +73,200 @@ def run(
 def perform(recipe: Recipe, plugins: PluginManager, *, progress: Progress = NO_PROGRESS) -> Job:
     """All of a job but its files: read, paint, place, solve, measure. Raises ContactError."""
     job = prepare(recipe, plugins, progress=progress)
-    _solve(job)
+    with job.stage("solve", SOLVE, "Solving the pose"):
+        _solve(job)
+        _move_contacts(job)
+    job.progress.tell(MEASURE, "Measuring")
+    job.metrics = measured(job)
+    job.verdict = judged(job)
     return job
 
 
 def prepare(recipe: Recipe, plugins: PluginManager, *, progress: Progress = NO_PROGRESS) -> Job:
     """A job up to its solve: read, painted, placed and paired; `job.session.problem` makes its problem."""
     job = Job(recipe, Session(plugins=plugins), progress)
-    _read(job, plugins)
-    _paint(job, plugins)
-    _place(job, plugins)
+    with job.stage("read", 0.0, "Reading the manipulator and the object"):
+        _read(job)
+    with job.stage("parameterize", 0.1, "Painting contacts on the manipulator"):
+        for spec in recipe.patches:
+            _paint(job, spec)
+    with job.stage("transfer", 0.3, "Placing the contacts on the object"):
+        _place(job)
+        _start(job)
     return job
 
 
-def _read(job: Job, plugins: PluginManager) -> None:
-    recipe = job.recipe
-    with job.stage("read", 0.0, "Reading the manipulator and the object"):
-        job.manipulator = read_source(recipe.manipulator, plugins, recipe.folder)
-        if job.manipulator.rig is None:
-            raise InvalidInput(
-                f"the manipulator {job.manipulator.name} has no skeleton; a recipe poses a skinned one."
-            )
-        unit = job.rig.meters_per_unit
-        raw = read_source(recipe.object.source, plugins, recipe.folder)
-        mesh = object_mesh(raw, recipe.object, unit, job.length)
-        job.object = Asset(
-            f"{raw.name} (object)" if raw.name == job.manipulator.name else raw.name, mesh, None,
-            raw.source_vertices, raw.source_faces, unit, raw.up_axis, raw.notes, raw.details,
-        )  # fmt: skip
-        job.solids = solids_of(mesh, recipe.object)
-        job.placed = world_from_object(recipe.coarse, mesh)
-        job.session.surfaces.add(HAND, job.manipulator.mesh, meters_per_unit=unit, rig=job.rig)
-        job.session.surfaces.add(OBJECT, mesh, meters_per_unit=unit, world_from_surface=job.placed)
-        job.notes += [f"{asset.name}: {note}" for asset in (job.manipulator, raw) for note in asset.notes]
-
-
-def _paint(job: Job, plugins: PluginManager) -> None:
-    with job.stage("parameterize", 0.1, "Painting contacts on the manipulator"):
-        drawn: dict[str, SurfacePoints] = {}
-        for spec in job.recipe.patches:
-            points = paint(spec, job.manipulator)
-            drawn[spec.name] = axis_picks(spec, job.manipulator, points, drawn, plugins)
-            job.session.patches.paint(spec.name, points, surface=HAND, axis=drawn[spec.name])
-
-
-def _place(job: Job, plugins: PluginManager) -> None:
+def _read(job: Job) -> None:
     recipe, session = job.recipe, job.session
-    with job.stage("transfer", 0.3, "Placing the contacts on the object"):
-        own = {spec.name: spec.place for spec in recipe.patches if spec.place is not None}
-        names = [spec.name for spec in recipe.patches if spec.name not in own]
-        pose = coarse_pose(job.rig, recipe.coarse)
-        job.placement = PlacementResult({}, {}, pose)
+    for spec in recipe.manipulators:
+        asset = job.assets[spec.name] = read_source(spec.source, session.plugins, recipe.folder)
+        if asset.rig is None:
+            raise InvalidInput(f"the manipulator {asset.name} has no skeleton; a recipe poses a skinned one.")
+        job.notes += [f"{asset.name}: {note}" for note in asset.notes]
+    rigs = {name: asset.rig for name, asset in job.assets.items() if asset.rig is not None}
+    unit = next(iter(rigs.values())).meters_per_unit
+    for spec in recipe.manipulators:
+        rig = rigs[spec.name]
+        if rig.meters_per_unit != unit:
+            raise InvalidInput(
+                f"the manipulators of a recipe share their unit, but {rig.name} has {rig.meters_per_unit:g} metres"
+                f" per unit and the first {unit:g}."
+            )
+        standing = world_from_manipulator(spec)
+        mesh = job.assets[spec.name].mesh
+        session.surfaces.add(spec.name, mesh, meters_per_unit=unit, rig=rig, world_from_surface=standing)
+    length = job.length(recipe.manipulators[0].name)
+    taken = {asset.name for asset in job.assets.values()}
+    for thing in recipe.objects:
+        raw = read_source(thing.source, session.plugins, recipe.folder)
+        mesh = object_mesh(raw, thing, unit, length)
+        name = f"{raw.name} ({thing.name})" if raw.name in taken else raw.name
+        taken.add(name)
+        job.assets[thing.name] = Asset(
+            name, mesh, None, raw.source_vertices, raw.source_faces, unit, raw.up_axis, raw.notes, raw.details
+        )
+        job.solids[thing.name] = solids_of(mesh, thing)
+        standing = world_from_object(thing, mesh)
+        session.surfaces.add(thing.name, mesh, meters_per_unit=unit, world_from_surface=standing)
+        job.notes += [f"{raw.name}: {note}" for note in raw.notes]
+
+
+def _paint(job: Job, spec: PatchSpec) -> None:
+    surface, _ = job.touches(spec)
+    asset, plugins = job.assets[surface], job.session.plugins
+    points = painted_points(spec, asset)
+    try:
+        name = plugins.name_for(AXIS_GENERATORS, "recipe", spec.generator)
+        generator = plugins.make(AXIS_GENERATORS, name, **spec.generator_options)
+        axis = axis_points(spec, asset)
+        job.session.patches.paint(spec.name, points, surface=surface, axis=axis, generator=generator)
+    except InvalidInput as error:
+        raise type(error)(f"the axis of patch {spec.name!r}: {error}") from error
+
+
+def _place(job: Job) -> None:
+    recipe, session = job.recipe, job.session
+    coarse = {spec.name: curled(session.rigs[spec.name], spec.pose) for spec in recipe.manipulators}
+    for hand, thing in job.touching:
+        specs = [spec for spec in recipe.patches if job.touches(spec) == (hand, thing)]
+        names = [spec.name for spec in specs if spec.place is None]
         if names:
-            job.placement = place_from(job, plugins, names, recipe.placer, pose, recipe.placer_options)
-        for name, place in job.placement.placed.items():
-            _transfer(session, name, place.root, direction=place.direction)
-        for name, root in own.items():
-            point, heading = explicit_root(root, job.object)
-            _transfer(session, name, point, heading=heading)
-        if not session.document.pairs:
-            reasons = "; ".join(f"{name}: {why}" for name, why in job.placement.left_out.items())
-            raise InvalidInput(f"the hand is not near the object, no contact found a place ({reasons}).")
-        job.start, job.start_distance = _start(job)
-        session.surfaces.set_pose(HAND, job.start, title="Start")
+            found = place_from(job, hand, thing, names, recipe.placer, coarse[hand], recipe.placer_options)
+            job.left_out |= found.left_out
+            for name, place in found.placed.items():
+                _transfer(job, name, thing, place.root, direction=place.direction)
+            if found.pose is not None and recipe.solve.start == "coarse":
+                job.start[hand] = found.pose
+        for spec in specs:
+            if spec.place is not None:
+                point, heading = target_root(spec.place, job.assets[thing])
+                _transfer(job, spec.name, thing, point, heading=heading)
+    if not session.document.pairs:
+        reasons = "; ".join(f"{name}: {why}" for name, why in job.left_out.items())
+        raise InvalidInput(f"the hand is not near the object, no contact found a place ({reasons}).")
 
 
 def place_from(
-    job: Job, plugins: PluginManager, names: list[str], placer: str | None, pose: Pose, options: Mapping[str, Any]
+    job: Job, hand: str, thing: str, names: list[str], placer: str | None, pose: Pose, options: Mapping[str, Any]
 ) -> PlacementResult:
-    """Ask a placer for roots and directions of patches, the manipulator in `pose`. None: the default placer."""
+    """Ask a placer for roots and directions of patches on an object, the manipulator in `pose`. None: the default
+    placer."""
+    plugins, geometry = job.session.plugins, job.session.geometry
     request = PlacementRequest(
-        rig=job.rig,
+        rig=job.session.rigs[hand],
         pose=pose,
-        object_mesh=job.object.mesh,
-        object_from_rig=np.asarray(np.linalg.inv(job.placed)),
-        patch_points={name: job.session.geometry.points(name) for name in names},
-        patch_axes={name: job.session.geometry.axis_points(name) for name in names},
-        solids=job.solids,
+        object_mesh=geometry.mesh(thing),
+        object_from_rig=object_from(job, thing, hand),
+        patch_points={name: geometry.points(name) for name in names},
+        patch_axes={name: geometry.axis_points(name) for name in names},
+        solids=job.solids[thing],
     )
     return plugins.make(PLACERS, plugins.name_for(PLACERS, "recipe", placer), **options).place(request)
 
 
-def target(name: str) -> str:
-    """Name of the copy of a patch on the object."""
-    return f"{name} on {OBJECT}"
+def object_from(job: Job, thing: str, hand: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """(4, 4) rigid, from the rig space of a manipulator into the space of an object."""
+    surfaces = job.session.document.surfaces
+    return np.asarray(np.linalg.inv(surfaces[thing].world_from_surface) @ surfaces[hand].world_from_surface)
 
 
-def _transfer(session: Session, name: str, point: SurfacePoints, **heading: Any) -> None:
-    copy = session.patches.transfer(name, OBJECT, point, name=target(name), **heading)
+def target(patch: str, thing: str = "object") -> str:
+    """Name of the copy of a patch on an object."""
+    return f"{patch} on {thing}"
+
+
+def _transfer(job: Job, name: str, thing: str, point: SurfacePoints, **heading: Any) -> None:
+    session = job.session
+    copy = session.patches.transfer(name, thing, point, name=target(name, thing), **heading)
     session.patches.recolor(copy, session.document.patch(name).color)
     session.pairs.add(name, copy, name=name)
 
 
-def _start(job: Job) -> tuple[Pose, float]:
-    """Where the solve starts: the open hand away from the object, or the placer's coarse pose."""
-    recipe = job.recipe
-    direction = recipe.away_direction or tuple(-x for x in recipe.placer_options.get("approach", (0.0, 0.0, -1.0)))
-    pose, distance = away_pose(
-        job.rig, job.placed, job.object.mesh, np.array(direction, float), recipe.away * job.length
-    )
-    if recipe.solve.start == "coarse" and job.placement.pose is not None:
-        return job.placement.pose, 0.0
-    return pose, distance
+def _start(job: Job) -> None:
+    """Where the solve starts: the open hand away from its objects, or the placer's coarse pose."""
+    recipe, session = job.recipe, job.session
+    usual = tuple(-x for x in recipe.placer_options.get("approach", (0.0, 0.0, -1.0)))
+    direction = np.array(recipe.away_direction or usual, float)
+    for spec in recipe.manipulators:
+        hand = spec.name
+        objects = [(object_from(job, t, hand), session.geometry.mesh(t)) for h, t in job.touching if h == hand]
+        job.start_distance[hand] = 0.0
+        if hand not in job.start:
+            clear = recipe.away * job.length(hand)
+            job.start[hand], job.start_distance[hand] = backed_off(session.rigs[hand], objects, direction, clear)
+        session.surfaces.set_pose(hand, job.start[hand], title="Start")
 
 
 def _solve(job: Job) -> None:
-    with job.stage("solve", 0.45, "Solving the pose"):
-        solve(job)
-        move_contacts(job)
-    job.progress.tell(0.7, "Measuring")
-    job.metrics = measure(posed_scene(job, job.pose))
-    job.verdict = judge(job.metrics, job.placement.left_out, job.recipe.accept)
+    """Pose the manipulators by the job's pairs. Raises Cancelled when the user stops it, InvalidInput for wrong
+    settings."""
+    moves = job.recipe.solve.settle or job.recipe.solve.slide
+    part = job.progress.part(SOLVE, MOVE if moves else MEASURE, "Solving the pose")
+    proposal = job.session.solve(settings=replace(settings_of(job), progress=part))
+    if proposal.after.status is SolveStatus.CANCELLED:
+        raise Cancelled("the solve was cancelled.")
+    _accept(job, proposal)
 
 
-def posed_scene(job: Job, pose: Pose) -> PosedScene:
-    """What the metrics look at, for one pose."""
-    into_object = np.asarray(np.linalg.inv(job.placed))
-    pairs = {geometry.pair.name: geometry for geometry in job.session.geometry.pairs()}
-    return PosedScene(
-        rest=job.manipulator.mesh,
-        skin=posed_skin(job.rig, pose, job.placed),
-        bones=bone_segments(job.rig.parents, into_object @ posed_world(job.rig, pose)),
-        rest_local=job.rig.rest_local,
-        local=pose.local[[pose.joints.index(name) for name in job.rig.joints]],
-        moving=job.rig.parents >= 0,
-        object_mesh=job.object.mesh,
-        solids=job.solids,
-        contacts={name: Contact(pair.manipulator_points, pair.object_points) for name, pair in pairs.items()},
-        length=job.length,
+def _move_contacts(job: Job) -> None:
+    """Settle contacts, then let them slide, where the recipe asks for it: proposals, accepted as they come."""
+    spec = job.recipe.solve
+    settings = settings_of(job, AGAIN)
+    middle = 0.5 * (MOVE + MEASURE)
+    if spec.settle:
+        settling = replace(settings, progress=job.progress.part(MOVE, middle, "Settling contacts"))
+        _accept(job, job.session.settle(rounds=spec.settle, settings=settling))
+    if spec.slide:
+        sliding = replace(settings, progress=job.progress.part(middle, MEASURE, "Sliding contacts"))
+        _accept(job, job.session.slide(slack=spec.slide, settings=sliding))
+
+
+def settings_of(job: Job, candidates: tuple[str, ...] | None = None) -> SolveSettings:
+    """The recipe's settings. candidates: in place of the recipe's."""
+    spec = job.recipe.solve
+    common = {name: value for name, value in spec.options.items() if name in COMMON}
+    common |= {"candidates": candidates} if candidates else {}
+    return SolveSettings(
+        solver=spec.solver,
+        solver_settings={name: value for name, value in spec.options.items() if name not in COMMON},
+        options=configured(SolveOptions, common, "solve.options"),
+        objective=Objective(_terms(job), "rig" if spec.limits else "none"),
+        solids={name: solids for name, solids in job.solids.items() if solids},
     )
+
+
+def _accept(job: Job, proposal: Proposal) -> None:
+    job.session.accept(proposal)
+    job.notes += [f"{name} stays where it is: {why}." for name, why in proposal.left_out.items()]
+    job.solution = proposal.after
+
+
+def _terms(job: Job) -> tuple[PoseTerm, ...]:
+    spec = job.recipe.solve
+    terms = paper_terms(*spec.weights)
+    solids = {name: solids for name, solids in job.solids.items() if solids}
+    if spec.penetration > 0.0 and solids:
+        plugins = job.session.plugins
+        name = plugins.name_for(POSE_TERMS, "depth")
+        terms += (plugins.make(POSE_TERMS, name, weight=spec.penetration, solids=solids),)
+    return terms

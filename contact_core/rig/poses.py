@@ -1,18 +1,60 @@
-"""What people do with poses: set angles, blend, mirror."""
+"""What people do with poses: look at the skin, set angles, blend, mirror."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 
 import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.rig.chart import Chart, pose_on
-from contact_core.rig.rig import Pose, Rig, forward_kinematics
+from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
 from contact_core.rig.rotations import exponential, nearest_rotations
+
+
+def posed_world(rig: Rig, pose: Pose) -> FloatArray:
+    """(j, 4, 4) world_from_joint in rig space of a pose; joints that it does not name stay at rest."""
+    return forward_kinematics(rig.parents, pose_on(rig, pose))
+
+
+def posed_points(rig: Rig, pose: Pose) -> FloatArray:
+    """(n, 3) the skin in a pose, rig space; joints that the pose does not name stay at rest."""
+    return skin(rig, posed_world(rig, pose))
+
+
+def curled(rig: Rig, degrees: Mapping[str, Sequence[float]]) -> Pose:
+    """The rest pose with some joints turned, within their limits.
+
+    degrees: by name or pattern ("index*") of joints: one angle curls (the last rotation dof), several are all
+    rotation dofs in order (twist, spread, flexion). Raises InvalidInput for joints or angles that do not exist.
+    """
+    chart = Chart(rig)
+    theta = np.zeros(chart.size)
+    for pattern, angles in degrees.items():
+        joints = [j for j, name in enumerate(rig.joints) if fnmatchcase(name, pattern)]
+        if not joints:
+            raise InvalidInput(f"no joint of {rig.name} matches {pattern!r}.")
+        for joint in joints:
+            dofs = np.arange(chart.size)[chart.rotation_slices[joint]]
+            chosen = dofs[-1:] if len(angles) == 1 else dofs
+            if len(chosen) != len(angles):
+                raise InvalidInput(
+                    f"joint {rig.joints[joint]!r} has {len(dofs)} angles, but got {len(angles)} of them."
+                )
+            theta[chosen] = np.clip(np.radians(angles), chart.lower[chosen], chart.upper[chosen])
+    return Pose(rig.joints, chart.local(theta))
+
+
+def moved_roots(rig: Rig, pose: Pose, move: FloatArray) -> Pose:
+    """The pose of all joints with its roots moved, by (4, 4) in rig space."""
+    local = pose_on(rig, pose).copy()
+    roots = rig.parents < 0
+    local[roots] = move @ local[roots]
+    return Pose(rig.joints, local)
 
 
 def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:

@@ -16,7 +16,8 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.transform import transform_points
 from contact_core.rig.chart import Chart
-from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
+from contact_core.rig.poses import posed_points
+from contact_core.rig.rig import Pose, Rig
 from contact_core.scene.host import RigReading, SceneReading
 from contact_core.solve.black_box import BlackBoxDof, DeformedSkin, dof_pose
 from contact_core.solve.body import Body
@@ -111,10 +112,7 @@ def probes(rig: Rig) -> tuple[Pose, ...]:
 
 def skin_in(rig: Rig, pose: Pose) -> FloatArray:
     """(n, 3) the analytic skin in a pose, rig space."""
-    local = rig.rest_local.copy()
-    for joint, matrix in zip(pose.joints, pose.local, strict=True):
-        local[rig.joint_index(joint)] = matrix
-    return skin(rig, forward_kinematics(rig.parents, local))
+    return posed_points(rig, pose)
 
 
 class EvaluatedRig(DeformedSkin):

@@ -19,7 +19,7 @@ def test_every_key_is_documented_and_no_other(repository: Path) -> None:
         key for group in re.findall(r"exactly_one\(([^)]*)\)", source) for key in re.findall(r"\"(\w+)\"", group)
     }
     known |= {field.name for field in dataclasses.fields(from_pose.FromPose)}  # a placer's settings are keys
-    assert {"schema", "object_center", "disk", "sha256", "approach", "aim"} <= known
+    assert {"schema", "center", "disk", "sha256", "approach", "aim"} <= known
     page = (repository / "docs" / "recipes.md").read_text()
     documented = set(re.findall(r"[`]+\[*(\w+)", page))
     assert known <= documented, known - documented

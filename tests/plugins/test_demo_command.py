@@ -44,4 +44,4 @@ def test_a_bad_recipe_is_one_sentence_with_its_name(
 def test_demos_name_no_file() -> None:
     for name in demo_names():
         recipe = demo_recipe(name)
-        assert recipe.manipulator.file is None and recipe.object.source.file is None
+        assert recipe.manipulators[0].source.file is None and recipe.objects[0].source.file is None

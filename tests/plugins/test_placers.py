@@ -19,11 +19,11 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_geodesic
+from contact_core.job.job import Job
 from contact_core.job.run import perform
-from contact_core.job.scene import coarse_pose
-from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.slots import PlacementRequest
+from contact_core.rig.poses import curled
 from contact_core.rig.rig import Pose, skin
 from contact_core.rig.rig import forward_kinematics as forward
 from contact_core.settings import configured
@@ -43,13 +43,13 @@ def request() -> PlacementRequest:
     done = job()
     names = list(done.metrics["patches"])
     return PlacementRequest(
-        rig=done.rig,
-        pose=Pose.rest(done.rig),
-        object_mesh=done.object.mesh,
-        object_from_rig=np.asarray(np.linalg.inv(done.placed)),
+        rig=done.session.rigs["manipulator"],
+        pose=Pose.rest(done.session.rigs["manipulator"]),
+        object_mesh=done.session.geometry.mesh("object"),
+        object_from_rig=np.asarray(np.linalg.inv(done.session.document.surface("object").world_from_surface)),
         patch_points={name: done.session.geometry.points(name) for name in names},
         patch_axes={name: done.session.geometry.axis(name).points for name in names},
-        solids=done.solids,
+        solids=done.solids["object"],
     )
 
 
@@ -120,7 +120,7 @@ def test_the_thumb_search_is_never_worse_than_leaving_the_thumb_open() -> None:
 
 
 def test_pads_land_on_faces_that_face_them_and_the_middle_of_the_axis_comes_there() -> None:
-    ask = replace(request(), pose=coarse_pose(job().rig, job().recipe.coarse))
+    ask = replace(request(), pose=curled(request().rig, job().recipe.manipulators[0].pose))
     result = configured(FromPose, job().recipe.placer_options, "it").place(ask)
     assert result.pose is not None and not result.left_out
     hand = HandPose(replace(ask, pose=result.pose))
@@ -129,7 +129,10 @@ def test_pads_land_on_faces_that_face_them_and_the_middle_of_the_axis_comes_ther
         heading = direction_to_heading(ask.object_mesh, placed.root, placed.direction[None])
         middle = trace_geodesic(ask.object_mesh, placed.root, heading * pad.to_root).points
         assert pad.normal @ ask.object_mesh.face_normals[middle.faces[0]] <= FACING + 1e-9
-        assert np.linalg.norm(middle.positions(ask.object_mesh)[0] - pad.centre) < 0.06 * job().length + 1e-6
+        assert (
+            np.linalg.norm(middle.positions(ask.object_mesh)[0] - pad.centre)
+            < 0.06 * job().length("manipulator") + 1e-6
+        )
         assert abs(np.linalg.norm(placed.direction) - 1.0) < 1e-9
 
 
@@ -173,7 +176,7 @@ def test_pads_out_of_reach_are_left_out_and_named_with_their_distance() -> None:
 
 def test_the_naive_placer_leaves_the_fingers_open() -> None:
     result = Naive(approach=UPWARD, without=("thumb*",)).place(request())
-    rig = job().rig
+    rig = request().rig
     assert result.pose is not None
     inner = rig.parents >= 0
     np.testing.assert_allclose(result.pose.local[inner], rig.rest_local[inner], atol=1e-12)

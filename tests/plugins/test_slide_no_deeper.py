@@ -154,7 +154,7 @@ def test_where_skin_would_be_deeper_nothing_slides_and_it_is_said(repository: Pa
     recipe = load_recipe(repository / "examples" / "07_mug_slide.toml")
     job = perform(replace(recipe, solve=replace(recipe.solve, slide=0.0)), PLUGINS)
     draft = Draft(job.session.document, job.session.derived, job.session.rigs)
-    settings = Through(objective=Objective(job.solution.problem.terms), solids={"object": job.solids})
+    settings = Through(objective=Objective(job.solution.problem.terms), solids=job.solids)
     proposal = slide(draft.document, draft, PLUGINS, job.session.revision, settings)
     assert proposal.command.placements == ()
     assert proposal.after.value == pytest.approx(proposal.before.value, rel=1e-9)

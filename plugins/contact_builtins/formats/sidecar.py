@@ -14,8 +14,8 @@ from contact_builtins.formats.refusal import file_bytes
 from contact_core.arrays import FloatArray
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.hands.description import HandWords
-from contact_core.job.table import parse_toml
 from contact_core.rig.rig import ROTATION_DOFS, JointFreedom
+from contact_core.strict_table import parse_toml
 
 SCHEMA = 1
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}

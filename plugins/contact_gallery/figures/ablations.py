@@ -58,8 +58,8 @@ def draw(sheet: Sheet) -> None:
                 if form == "here"
                 else proposal.after.patches
             )
-            apart = 100.0 * np.mean([one.mean for one in met.values()]) / job.length
-            deep = 100.0 * deepest(session, "manipulator", "object") / job.length
+            apart = 100.0 * np.mean([one.mean for one in met.values()]) / job.length("manipulator")
+            deep = 100.0 * deepest(session, "manipulator", "object") / job.length("manipulator")
             turned = np.degrees(
                 np.abs(
                     proposal.after.theta[~(proposal.after.problem.is_root | proposal.after.problem.is_translation)]

@@ -34,9 +34,9 @@ def draw(sheet: Sheet) -> None:
         session.surfaces.set_pose("manipulator", found.poses["manipulator"])
         skins[kind] = session.geometry.posed_mesh("manipulator").points
         met = patch_residuals(problem, problem.theta_of(found.poses)).values()
-        apart = 100.0 * np.mean([one.mean for one in met]) / job.length
-        deep = 100.0 * deepest(session, "manipulator", "object") / job.length
-        away = 100.0 * np.linalg.norm(skins[kind] - skins["area"], axis=1).mean() / job.length
+        apart = 100.0 * np.mean([one.mean for one in met]) / job.length("manipulator")
+        deep = 100.0 * deepest(session, "manipulator", "object") / job.length("manipulator")
+        away = 100.0 * np.linalg.norm(skins[kind] - skins["area"], axis=1).mean() / job.length("manipulator")
         told = f"areas {apart:.1f} % of the hand apart, skin {deep:.1f} % deep, {away:.1f} % from the pose by areas"
         sheet.measure(f"{kind}, weights {weights[0]:g}, {weights[1]:g}, {weights[2]:g}", told, CLAIMS[kind])
         pictures.append(

@@ -9,6 +9,7 @@ from importlib.resources import files
 import numpy as np
 
 from contact_builtins.demos import demo_recipe
+from contact_core.geometry.transform import transform_points
 from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import perform
@@ -25,19 +26,15 @@ def draw(sheet: Sheet) -> None:
         for name in names:
             recipe = recipe_of(name)
             job = perform(recipe, sheet.plugins)
-            job.session.surfaces.set_pose("manipulator", job.pose)
             steps = [step.command.label().split()[0] for step in job.session.history.done]
             sheet.operations += sum(word in ("Paint", "Transfer", "Pair") for word in steps) + 1  # and the solve
-            touched = np.concatenate(
-                [pair.object_points.positions(job.object.mesh) for pair in job.session.geometry.pairs()]
-            )
+            geometry = job.session.geometry
+            thing, standing = geometry.mesh("object"), job.session.document.surface("object").world_from_surface
+            touched = np.concatenate([pair.object_points.positions(thing) for pair in geometry.pairs()])
             around = np.concatenate(
-                [
-                    touched @ job.placed[:3, :3].T + job.placed[:3, 3],
-                    job.session.geometry.posed_mesh("manipulator").points,
-                ]
+                [transform_points(standing, touched), geometry.posed_mesh("manipulator").points]
             )
-            kind = recipe.manipulator.sample or ""
+            kind = recipe.manipulators[0].source.sample or ""
             skin = next((color for word, color in LOOKS.items() if kind.startswith(word)), SKIN)
             pictures.append(
                 view(

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
+from contact_core.job.job import Job
 from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import perform
-from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 
 pytestmark = [pytest.mark.assets, pytest.mark.slow]
@@ -62,7 +62,7 @@ def test_the_grasp_keeps_its_thresholds(name: str, assets: Path) -> None:
     assert job.metrics["skin_stretch_p99"] < 1.6
     assert job.metrics["max_joint_change_deg"] <= 120.0
     assert job.verdict.is_grasp, job.verdict.failures
-    assert job.placement.left_out == {}
+    assert job.left_out == {}
 
 
 @pytest.mark.parametrize("name", GRASP)
@@ -76,10 +76,11 @@ def test_the_recipe_does_not_loosen_the_table(name: str) -> None:
 @pytest.mark.parametrize("name", GRASP)
 def test_the_hand_starts_open_and_a_length_away(name: str, assets: Path) -> None:
     job = posed(name)
-    assert job.start_distance >= job.length
-    start = job.start.local.copy()
-    start[job.rig.parents < 0, :3, 3] = job.rig.rest_local[job.rig.parents < 0, :3, 3]
-    assert (start == job.rig.rest_local).all()
+    rig = job.session.rigs["manipulator"]
+    assert job.start_distance["manipulator"] >= job.length("manipulator")
+    start = job.start["manipulator"].local.copy()
+    start[rig.parents < 0, :3, 3] = rig.rest_local[rig.parents < 0, :3, 3]
+    assert (start == rig.rest_local).all()
     assert job.metrics["contacts"] >= 300
     titles = [step.command.label() for step in job.session.history.done]
     assert max(k for k, title in enumerate(titles) if title.startswith("Transfer")) < len(titles) - 1
@@ -103,5 +104,5 @@ def test_a_bad_placement_is_reported_as_bad(assets: Path) -> None:
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("0*.toml")), ids=lambda path: path.stem)
 def test_every_example_names_its_files_by_digest(path: Path) -> None:
     recipe = load_recipe(path)
-    sources: list[Any] = [recipe.manipulator, recipe.object.source]
+    sources: list[Any] = [recipe.manipulators[0].source, recipe.objects[0].source]
     assert all(source.sample is not None or source.sha256 is not None for source in sources)

@@ -14,17 +14,19 @@ import pytest
 from contact_builtins.demos import demo_names, demo_recipe
 from contact_core.document.schema import parse_document
 from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInput
-from contact_core.job.assets import convex_hull
+from contact_core.geometry.hull import convex_hull
+from contact_core.job.job import Job
 from contact_core.job.outputs import write_outputs
-from contact_core.job.painting import paint
+from contact_core.job.points import painted_points
 from contact_core.job.recipe import AssetSource, PatchSpec, PointSpec, Recipe, RootSpec
 from contact_core.job.run import perform, run, target
-from contact_core.job.scene import posed_skin
-from contact_core.job.workpiece import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import CallbackProgress
+from contact_core.rig.pose_files import load_pose
 from contact_core.scene.picture import Picture
 from contact_core.testing.meshes import icosphere, torus
+
+HAND = "manipulator"
 
 
 @cache
@@ -41,7 +43,7 @@ def demo(name: str = "mug") -> Job:
 def test_every_demo_is_what_it_says(name: str) -> None:
     job = demo(name)
     assert job.verdict.is_grasp == (name != "bad"), job.verdict.failures
-    assert job.start_distance >= job.length
+    assert job.start_distance[HAND] >= job.length(HAND)
     assert job.metrics["contacts"] >= 300
 
 
@@ -62,7 +64,7 @@ def test_the_demo_keeps_grasp() -> None:
     assert job.metrics["max_joint_change_deg"] <= 120
     names = " ".join(job.metrics["patches"])
     assert all(digit in names for digit in ("palm", "thumb", "index", "middle", "ring", "little"))
-    assert len(job.solids) == 2
+    assert len(job.solids["object"]) == 2
 
 
 @pytest.mark.parametrize("name", ["mug", "pole"])
@@ -70,7 +72,7 @@ def test_the_thumb_opposes_the_fingers(name: str) -> None:
     """What makes a grip a grip: the surface under the thumb looks the other way than under the other contacts."""
     job = demo(name)
     pairs = {pair.pair.name: pair.object_points for pair in job.session.geometry.pairs()}
-    normals = {name: points.normals(job.object.mesh).mean(axis=0) for name, points in pairs.items()}
+    normals = {name: points.normals(job.assets["object"].mesh).mean(axis=0) for name, points in pairs.items()}
     thumb = normals.pop("thumb_distal")
     others = np.mean(list(normals.values()), axis=0)
     assert thumb @ others < -0.5 * np.linalg.norm(thumb) * np.linalg.norm(others)
@@ -138,10 +140,9 @@ def test_a_job_writes_its_files_and_they_can_be_read_again(tmp_path: Path) -> No
     assert fractions == sorted(fractions) and fractions[-1] == 1.0
 
     document = parse_document((tmp_path / "out" / "document.json").read_bytes(), "document.json")
-    pose = json.loads((tmp_path / "out" / "pose.json").read_text())
-    stored = document.poses["manipulator"]
-    for name, local in zip(stored.joints, stored.local, strict=True):
-        np.testing.assert_array_equal(pose["joints"][name], local)
+    pose, stored = load_pose(tmp_path / "out" / "pose.json"), document.poses[HAND]
+    assert pose.joints == stored.joints
+    np.testing.assert_array_equal(pose.local, stored.local)
     assert len(document.pairs) == len(report["patches"])
 
     before, after, through = sketch.pictures
@@ -161,7 +162,7 @@ def test_the_posed_model_is_the_pose(tmp_path: Path) -> None:
 
     scene = trimesh.load(result.files["model"])
     assert len(scene.geometry) == 2
-    skin = posed_skin(job.rig, job.pose)
+    skin = job.session.geometry.posed_mesh(HAND)
     assert any(len(mesh.faces) == len(skin.faces) for mesh in scene.geometry.values())
 
 
@@ -198,11 +199,19 @@ def test_explicit_roots_and_headings_are_used_as_given() -> None:
     for place in (by_direction, by_aim):
         first, *others = recipe.patches
         job = perform(replace(recipe, patches=(replace(first, place=place), *others)), plugins())
-        axis = job.session.geometry.axis(target(first.name)).points.positions(job.object.mesh)
+        axis = job.session.geometry.axis(target(first.name)).points.positions(job.assets["object"].mesh)
         assert np.linalg.norm(axis[0] - [0.03, 0.62, 0.0]) < 3e-3
         way = axis[-1] - axis[0]
         assert way[1] / np.linalg.norm(way) > 0.95
-        assert first.name not in job.placement.placed
+        assert first.name not in job.left_out
+
+
+def posing(recipe: Recipe, **changes: Any) -> Recipe:
+    return replace(recipe, manipulators=(replace(recipe.manipulators[0], **changes),))
+
+
+def touching(recipe: Recipe, **changes: Any) -> Recipe:
+    return replace(recipe, objects=(replace(recipe.objects[0], **changes),))
 
 
 def _patched(recipe: Recipe, **changes: Any) -> Recipe:
@@ -211,11 +220,11 @@ def _patched(recipe: Recipe, **changes: Any) -> Recipe:
 
 REFUSALS: dict[str, tuple[Any, str]] = {
     "a manipulator without bones": (
-        lambda r: replace(r, manipulator=AssetSource(sample="mug")), "has no skeleton"
+        lambda r: posing(r, source=AssetSource(sample="mug")), "has no skeleton"
     ),
-    "an unknown sample": (lambda r: replace(r, manipulator=AssetSource(sample="tail")), "tail"),
+    "an unknown sample": (lambda r: posing(r, source=AssetSource(sample="tail")), "tail"),
     "a file that is nowhere": (
-        lambda r: replace(r, manipulator=AssetSource(file="nowhere.glb")), "nowhere.glb is not beside the recipe"
+        lambda r: posing(r, source=AssetSource(file="nowhere.glb")), "nowhere.glb is not beside the recipe"
     ),
     "an unknown joint": (
         lambda r: _patched(r, disk=replace(r.patches[0].disk, at=PointSpec(joint="thumb_dist"))), "near names"
@@ -230,14 +239,14 @@ REFUSALS: dict[str, tuple[Any, str]] = {
         lambda r: replace(r, placer_options={**r.placer_options, "close": ["toe*"]}), "no joint of .* matches 'toe"
     ),
     "an approach that misses": (
-        lambda r: replace(r, coarse=replace(r.coarse, object_center=(5.0, 0, 0))), "passes the object"
+        lambda r: touching(r, center=(5.0, 0, 0)), "passes the object"
     ),
-    "a coarse pose of no joint": (lambda r: replace(r, coarse=replace(r.coarse, pose={"toe": (3.0,)})), "toe"),
+    "a coarse pose of no joint": (lambda r: posing(r, pose={"toe": (3.0,)}), "toe"),
     "too many angles": (
-        lambda r: replace(r, coarse=replace(r.coarse, pose={"thumb_tip": (3.0, 2.0)})), "has 0 angles, but got 2"
+        lambda r: posing(r, pose={"thumb_tip": (3.0, 2.0)}), "has 0 angles, but got 2"
     ),
     "an object of another unit": (
-        lambda r: replace(r, object=replace(r.object, scale=1e-9)), "across; mend object.scale, or the units"
+        lambda r: touching(r, scale=1e-9), "across; mend object.scale, or the units"
     ),
     "a disk larger than the hand": (
         lambda r: _patched(r, disk=replace(r.patches[0].disk, radius=1e9)), "radius is 1e.09, but .* units across"
@@ -348,13 +357,48 @@ def test_a_hull_holds_all_points_and_looks_outwards() -> None:
     assert (np.einsum("mi,mi->m", hull.face_normals, middles - centre) > 0).all()
     low = convex_hull(icosphere(3), high=(1.0, 1.0, 0.0))
     assert low.points[:, 2].max() <= 0.0
-    with pytest.raises(InvalidInput, match=r"hull_box leaves 0 points"):
+    with pytest.raises(InvalidInput, match=r"the box leaves 0 points"):
         convex_hull(mesh, low=(50.0, 50.0, 50.0))
 
 
 def test_a_patch_by_file_vertices_uses_the_files_own_numbers() -> None:
     spec = PatchSpec("a", vertices=(5, 9))
-    asset = demo("alien").manipulator
-    points = paint(spec, asset).positions(asset.mesh)
+    asset = demo("alien").assets[HAND]
+    points = painted_points(spec, asset).positions(asset.mesh)
     vertices = np.array([5, 9]) if asset.source_vertices is None else asset.source_vertices[[5, 9]]
     np.testing.assert_allclose(points, asset.mesh.points[vertices])
+
+
+def test_two_hands_take_one_pole_each_from_its_own_place(tmp_path: Path) -> None:
+    """Any number of manipulators: the second hand, further along the pole, does what the first does."""
+    recipe = demo_recipe("alien")
+    (first,), along = recipe.manipulators, (0.0, 0.0, 0.0)
+    (pole,) = recipe.objects
+    extent = perform(recipe, plugins()).assets["object"].mesh.points
+    shift = 0.2 * float(np.ptp(extent, axis=0).max())
+    along = (shift, 0.0, 0.0) if abs(pole.rotation[2]) == 90.0 else (0.0, shift, 0.0)
+    hands = (replace(first, name="left"), replace(first, name="right", position=along))
+    patches = [
+        replace(spec, name=f"{hand.name} {spec.name}", on=hand.name) for hand in hands for spec in recipe.patches
+    ]
+    both = replace(recipe, manipulators=hands, patches=tuple(patches))
+    result = run(both, tmp_path, plugins=with_renderers(Sketch()))
+    assert {"pose of left", "pose of right"} <= set(result.files)
+    assert result.verdict.is_grasp, result.verdict.failures
+    alone = demo("alien").metrics
+    assert result.report["contacts"] == 2 * alone["contacts"]
+    assert result.report["mean_contact_distance"] <= 1.5 * alone["mean_contact_distance"]
+
+
+def test_two_objects_are_held_by_one_hand() -> None:
+    """Any number of objects: the same pole twice, in one place; half of the contacts go to each."""
+    recipe = demo_recipe("alien")
+    (pole,) = recipe.objects
+    poles = (replace(pole, name="upper"), replace(pole, name="lower"))
+    patches = [replace(spec, onto=poles[number % 2].name) for number, spec in enumerate(recipe.patches)]
+    job = perform(replace(recipe, objects=poles, patches=tuple(patches)), plugins())
+    assert job.verdict.is_grasp, job.verdict.failures
+    assert {job.session.document.patch(pair.object).surface for pair in job.session.document.pairs.values()} == {
+        "upper", "lower",
+    }  # fmt: skip
+    assert job.metrics["contacts"] == demo("alien").metrics["contacts"]

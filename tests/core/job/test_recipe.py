@@ -18,13 +18,12 @@ name = "ball"
 file = "hand.glb"
 sha256 = "BC677831449400000000000000000000000000000000000000000000000000ff"
 rig = "hand.rig.toml"
+pose = { "index*" = [0, 0, 30], "thumb-1" = 20 }
 [object]
 sample = "baseball"
 solids = ["surface", "hull"]
 hull_box = { low = [-1, -1, -1], high = [1, 1, 1] }
-[coarse]
-object_center = [0, 0.1, 0]
-pose = { "index*" = [0, 0, 30], "thumb-1" = 20 }
+center = [0, 0.1, 0]
 [placer]
 name = "from pose"
 approach = [1, 0, 0]
@@ -51,17 +50,19 @@ def test_a_recipe_says_what_it_says() -> None:
     assert tip.disk.count == 40 and tip.generator is None and tip.place is None
     assert palm.vertices == (1, 2, 3) and palm.axis[1].position == (0.0, 0.0, 1.0)
     assert palm.place is not None and palm.place.aim is not None and palm.place.root.vertex == 7
-    assert recipe.manipulator.sha256 is not None and recipe.manipulator.sha256.startswith("bc67")
-    assert recipe.coarse.pose == {"index*": (0.0, 0.0, 30.0), "thumb-1": (20.0,)}
+    assert recipe.manipulators[0].source.sha256 is not None and recipe.manipulators[0].source.sha256.startswith(
+        "bc67"
+    )
+    assert recipe.manipulators[0].pose == {"index*": (0.0, 0.0, 30.0), "thumb-1": (20.0,)}
     assert recipe.placer_options == {"approach": [1, 0, 0], "close": ["index*"]}
     assert recipe.accept == {"gap": 0.01} and set(recipe.accept) <= set(ACCEPT)
-    assert recipe.object.solids == ("surface", "hull") and recipe.object.fill_high == (1.0, 1.0, 1.0)
+    assert recipe.objects[0].solids == ("surface", "hull") and recipe.objects[0].fill_high == (1.0, 1.0, 1.0)
 
 
 MISTAKES = {
     "no schema": ("schema = 1", "", r"recipe needs 'schema'"),
     "a newer schema": ("schema = 1", "schema = 7", r"schema 7; this contact-core reads up to 1. Update"),
-    "a misspelt key": ("object_center", "object_centre", r"coarse has no key 'object_centre'; did you mean 'object_center'"),
+    "a misspelt key": ("center =", "centre =", r"object has no key 'centre'; did you mean 'center'"),
     "an unknown table": ("[accept]", "[expect]", r"recipe has no key 'expect'; it knows .*accept"),
     "two sources": ('sample = "baseball"', 'sample = "baseball"\nfile = "b.obj"', r"exactly one of 'file', 'sample', but got 'file' and 'sample'"),
     "no source": ('sample = "baseball"', "", r"exactly one of 'file', 'sample', but got none"),
@@ -71,7 +72,7 @@ MISTAKES = {
     "a boolean is no number": ("radius = 0.007", "radius = true", r"a number above 0, but got True"),
     "not a number": ("radius = 0.007", "radius = nan", r"a number above 0, but got nan"),
     "too few points": ("points = 40", "points = 2", r"a whole number from 3 to 20000, but got 2"),
-    "a short vector": ("object_center = [0, 0.1, 0]", "object_center = [0, 0.1]", r"three numbers, but got \[0, 0.1\]"),
+    "a short vector": ("center = [0, 0.1, 0]", "center = [0, 0.1]", r"three numbers, but got \[0, 0.1\]"),
     "a zero direction": ("root = { vertex = 7 }, aim", "root = { vertex = 7 }, direction = [0,0,0], ain", r"ain|exactly one|not all zero"),
     "both ways to head": ("root = { vertex = 7 },", "root = { vertex = 7 }, direction = [1,0,0],", r"exactly one of 'direction', 'aim'"),
     "no place for the joint's name": ('"{joint} pad"', '"pad"', r"must hold \{joint\}"),
@@ -85,7 +86,7 @@ MISTAKES = {
     "too many angles": ('"thumb-1" = 20', '"thumb-1" = [1,2,3,4]', r"one to three angles"),
     "no vertex": ("vertices = [1, 2, 3]", "vertices = []", r"vertices holds no point"),
     "a number that overflows": ("radius = 0.007", "radius = " + "9" * 400, r"disk.radius must be a number above 0, but got 9+..."),
-    "a number that overflows when squared": ("object_center = [0,", "object_center = [1e300,", r"object_center must be three numbers"),
+    "a number that overflows when squared": ("center = [0,", "center = [1e300,", r"center must be three numbers"),
     "a number beyond Python's own": ("radius = 0.007", "radius = " + "9" * 5000, r"holds a number of more digits"),
     "such a number in base 16": ("radius = 0.007", "radius = 0x" + "f" * 5000, r"disk.radius must be .* but got a number without end"),
     "a vertex beyond the machine's numbers": ("vertices = [1, 2, 3]", f"vertices = [{2**63}]", r"a list of whole numbers"),

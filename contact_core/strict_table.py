@@ -30,7 +30,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
 
 
 class Table:
-    """One table of a recipe. `where` spells it in messages; `done` refuses what nobody asked for."""
+    """One table of a file. `where` spells it in messages; `done` refuses what nobody asked for."""
 
     def __init__(self, values: Any, where: str) -> None:
         if not isinstance(values, Mapping):
@@ -140,6 +140,13 @@ class Table:
         if not _is_list(value, 1000) or not value:
             raise InvalidInput(f"{self.where}.{key} must be a list of tables, [[{key}]], but got {_spell(value)}.")
         yield from (Table(item, f"{self.where}.{key}[{place}]") for place, item in enumerate(value))
+
+    def one_or_more(self, key: str) -> Iterator[Table]:
+        """The one table [key], or the tables of a list [[key]]."""
+        if isinstance(self.values.get(key), list):
+            yield from self.tables(key)
+        else:
+            yield self.table(key)
 
     def exactly_one(self, *keys: str) -> str:
         """The one of some keys that is there; raises InvalidInput unless it is exactly one."""

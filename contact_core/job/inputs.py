@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
-
-import numpy as np
 
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
+from contact_core.geometry.hull import convex_hull
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.job.recipe import AssetSource, ObjectSpec
+from contact_core.job.recipe import AssetSource, ObjectSpec, Recipe
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import SAMPLE, read_asset
 
@@ -91,31 +92,23 @@ def solids_of(mesh: TriangleMesh, spec: ObjectSpec) -> tuple[TriangleMesh, ...]:
     return tuple(made[kind]() for kind in spec.solids)
 
 
-def convex_hull(
-    mesh: TriangleMesh,
-    low: tuple[float, float, float] | None = None,
-    high: tuple[float, float, float] | None = None,
-) -> TriangleMesh:
-    """The convex hull of the mesh's points, of those within a box where one is given: a filled proxy.
+def inputs_of(recipe: Recipe) -> dict[str, dict[str, str]]:
+    """What a result was made from, by role: the SHA-256 of the recipe's content and of each file, or the sample."""
+    content = json.dumps({**asdict(recipe), "folder": None}, sort_keys=True).encode()
+    found = {"recipe": {"name": recipe.name, "sha256": hashlib.sha256(content).hexdigest()}}
+    sources = {spec.name: spec.source for spec in recipe.manipulators}
+    sources |= {spec.name: spec.source for spec in recipe.objects}
+    for role, source in sources.items():
+        found[role] = {"sample": source.sample} if source.sample else _file_facts(source, recipe.folder)
+        if source.sidecar is not None:
+            path = (recipe.folder or Path.cwd()) / source.sidecar
+            found[f"{role} rig"] = {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    return found
 
-    Raises InvalidInput when the box leaves too little for a hull.
-    """
-    from scipy.spatial import ConvexHull, QhullError
 
-    points = mesh.points[np.unique(mesh.faces)]
-    if low is not None:
-        points = points[(points >= np.asarray(low)).all(axis=1)]
-    if high is not None:
-        points = points[(points <= np.asarray(high)).all(axis=1)]
+def _file_facts(source: AssetSource, folder: Path | None) -> dict[str, str]:
     try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError) as error:
-        raise InvalidInput(f"object.hull_box leaves {len(points)} points, which span no hull; widen it.") from error
-    faces = hull.simplices.copy()
-    corners = points[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = (
-        np.einsum("mi,mi->m", normal, hull.equations[:, :3]) < 0
-    )  # qhull's normals point out, its order need not
-    faces[inward] = faces[inward][:, ::-1]
-    return TriangleMesh(points, faces)
+        path = find_file(source, folder)
+        return {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    except (FileRefused, OSError):  # it was read a moment ago, and is gone
+        return {"file": str(source.file)}
