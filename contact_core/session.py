@@ -24,9 +24,9 @@ from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
 from contact_core.edit.verbs import ContactSets, Film, Pairs, Patches
 from contact_core.errors import CommandRejected, FileRefused
+from contact_core.grasping.verbs import GraspingSession
 from contact_core.plugins.makers import PluginMakers
 from contact_core.plugins.registry import COMMANDS, GEODESIC_ENGINES
-from contact_core.proposals.verbs import ProposingSession
 from contact_core.scene.surfaces import SceneSurfaces
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ log = logging.getLogger(__name__)
 __all__ = ["DocumentChanged", "Session"]
 
 
-class Session(ProposingSession):
+class Session(GraspingSession):
     """Edits one document: the verbs stand in groups, and each commits one undo step.
 
     patches: paint, move, bend, link, transfer. pairs: which patches are to touch. surfaces: meshes and rigs behind

@@ -27,6 +27,7 @@ from contact_core.plugins.slots import CliCommand
 _OWN = (
     "contact_core.cli.pose:Pose",
     "contact_core.cli.batch:Batch",
+    "contact_core.cli.grasp:Grasp",
     "contact_core.cli.samples:Samples",
     "contact_core.cli.edits:History",
     "contact_core.cli.edits:Replay",

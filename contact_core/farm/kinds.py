@@ -97,7 +97,7 @@ def badness_of(metrics: Mapping[str, Any], limits: Mapping[str, float], failures
 
     A share that has to be large counts by what is missing to 1. What failed is above 1, whatever failed.
     """
-    from contact_core.job.recipe import ACCEPT
+    from contact_core.grasping.verdict import ACCEPT
 
     shares = [0.0]
     for key, limit in limits.items():

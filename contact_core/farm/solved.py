@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contact_core.errors import ContactError
-from contact_core.job.recipe import ACCEPT
+from contact_core.grasping.verdict import ACCEPT
 from contact_core.plugins.registry import RENDERERS
 from contact_core.plugins.slots import JobOutcome
 from contact_core.scene.picture import Picture, PictureMesh

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from contact_core.geometry.transform import transform_points
+from contact_core.grasping.metrics import Contact, PosedScene, measure
+from contact_core.grasping.verdict import ACCEPT, Verdict, judge
 from contact_core.job.job import Job
-from contact_core.job.metrics import Contact, PosedScene, measure
-from contact_core.job.recipe import ACCEPT
-from contact_core.job.report import Verdict, judge
 from contact_core.rig.bones import bone_segments
 from contact_core.rig.chart import pose_on
 from contact_core.rig.poses import posed_points, posed_world

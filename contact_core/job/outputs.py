@@ -13,11 +13,11 @@ from contact_core.atomic_file import write_atomic
 from contact_core.atomic_set import replacing_set
 from contact_core.document.schema import dump_document
 from contact_core.errors import ContactError
+from contact_core.grasping.verdict import DEFINITIONS, SCHEMA, table
 from contact_core.job.inputs import inputs_of
 from contact_core.job.job import Job, JobResult
 from contact_core.job.pictures import pictures_of
 from contact_core.job.recipe import Recipe
-from contact_core.job.report import DEFINITIONS, SCHEMA, table
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS, RENDERERS
 from contact_core.rig.pose_files import save_pose

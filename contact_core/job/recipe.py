@@ -154,19 +154,3 @@ class Recipe:
     accept: Mapping[str, float] = field(default_factory=dict)
     view: ViewSpec = field(default_factory=ViewSpec)
     folder: Path | None = None
-
-
-# What a grasp must reach unless its recipe says otherwise; fractions, degrees, counts. The loosest of GRASP.
-ACCEPT: dict[str, tuple[str, float]] = {
-    "mean_contact_distance": ("<=", 0.025),
-    "p95_contact_distance": ("<=", 0.055),
-    "gap": ("<=", 0.015),
-    "opposed_normals": (">=", 0.92),
-    "opposed_normals_45": (">=", 0.52),
-    "worst_patch_opposed_45": (">=", 0.20),
-    "max_penetration": ("<=", 0.018),
-    "skin_inside": ("<=", 0.034),
-    "bones_through": ("<=", 0.0),
-    "skin_stretch_p99": ("<=", 1.6),
-    "max_joint_change_deg": ("<=", 120.0),
-}

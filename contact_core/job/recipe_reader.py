@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from contact_core.errors import ContactError, FileRefused, InvalidInput
+from contact_core.grasping.verdict import ACCEPT
 from contact_core.job.recipe import (
-    ACCEPT,
     AssetSource,
     DiskSpec,
     ManipulatorSpec,

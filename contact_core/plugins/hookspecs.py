@@ -1,6 +1,6 @@
 """Every hook of contact-core, on one screen. Mark an implementation with `contact_core.plugins.hookimpl`.
 
-The first fourteen return what a plugin offers: an iterable of objects that satisfy the slot's protocol, or of
+The first sixteen return what a plugin offers: an iterable of objects that satisfy the slot's protocol, or of
 references "package.module:Name" to them, imported when first wanted (a class is then called without arguments),
 so that offering costs nothing and a missing library takes away one object, not a plugin.
 """
@@ -33,6 +33,12 @@ def contact_axis_generators() -> Offers:
 @hookspec
 def contact_placers() -> Offers:
     """Ways to choose where patches go on the object: `plugins.slots.Placer`."""
+@hookspec
+def contact_grasp_samplers() -> Offers:
+    """Where a hand may come from to grasp: `grasping.slots.GraspSampler`."""
+@hookspec
+def contact_grasp_scores() -> Offers:
+    """How good a solved grasp is: `grasping.slots.GraspScore`."""
 @hookspec
 def contact_pose_solvers() -> Offers:
     """Optimisers of a pose problem: `solve.solver.PoseSolver`."""

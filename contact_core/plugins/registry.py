@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from contact_core.contact.brush import Brush
     from contact_core.edit.command import Command
     from contact_core.geometry.engine import GeodesicEngine
+    from contact_core.grasping.slots import GraspSampler, GraspScore
     from contact_core.interaction.tool import Tool
     from contact_core.plugins.slots import (
         CliCommand,
@@ -62,6 +63,14 @@ AXIS_GENERATORS: Slot[AxisGenerator] = Slot(
 PLACERS: Slot[Placer] = Slot(
     "contact_placers", "placer", "contact_core.plugins.slots:Placer", roles=("settle", "recipe")
 )
+GRASP_SAMPLERS: Slot[GraspSampler] = Slot(
+    "contact_grasp_samplers", "grasp sampler", "contact_core.grasping.slots:GraspSampler",
+    roles=("grasp",), first_is="grasp",
+)  # fmt: skip
+GRASP_SCORES: Slot[GraspScore] = Slot(
+    "contact_grasp_scores", "grasp score", "contact_core.grasping.slots:GraspScore",
+    roles=("grasp",), first_is="grasp",
+)  # fmt: skip
 POSE_SOLVERS: Slot[PoseSolver] = Slot(
     "contact_pose_solvers", "pose solver", "contact_core.solve.solver:PoseSolver",
     roles=("solve",), first_is="solve",
@@ -98,6 +107,8 @@ SLOTS: tuple[Slot[Any], ...] = (
     BRUSHES,
     AXIS_GENERATORS,
     PLACERS,
+    GRASP_SAMPLERS,
+    GRASP_SCORES,
     POSE_SOLVERS,
     POSE_TERMS,
     GEODESIC_ENGINES,

@@ -71,7 +71,7 @@ class Renderer(Protocol):
         ...
 
     def render(self, pictures: Sequence[Picture], path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
-        """Draw pictures side by side into one PNG; whole or not at all."""
+        """Draw pictures, those of a row (`scene.picture.sheet_rows`) side by side, into one PNG; whole or not."""
         ...
 
 

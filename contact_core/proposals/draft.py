@@ -67,6 +67,22 @@ class Draft:
             self.surfaces.set_pose(name, pose)
 
 
+class RecordingDraft(Draft):
+    """A draft that remembers what was done to it, so that all of it can be committed as one step."""
+
+    commands: tuple[Command, ...] = ()
+
+    def do(self, command: Command, *, origin: str = "user") -> None:
+        super().do(command, origin=origin)
+        self.commands = (*self.commands, command)
+
+    def copy(self) -> RecordingDraft:
+        """Another that goes on from here."""
+        other = RecordingDraft(self._document, self._derived, self.rigs, self.evaluated, self.makers)
+        other.commands = self.commands
+        return other
+
+
 def change(before: ContactDocument, after: ContactDocument, title: str) -> Command:
     """The one command that takes a document to another, as far as placements and poses go."""
     moved = tuple(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from contact_core.arrays import FloatArray
@@ -24,6 +25,7 @@ class Picture:
 
     focus: (k, 3) what has to be in the frame; all meshes by default. table and legend stand above the scene.
     lettering: height of the caption's letters, times the usual.
+    row: of a sheet of pictures, from the top; those of one row stand side by side.
     """
 
     meshes: tuple[PictureMesh, ...]
@@ -36,3 +38,9 @@ class Picture:
     focus: FloatArray | None = None
     legend: tuple[tuple[str, tuple[float, float, float]], ...] = ()  # name, colour
     lettering: float = 1.0
+    row: int = 0
+
+
+def sheet_rows(pictures: Sequence[Picture]) -> list[list[Picture]]:
+    """Pictures by row, from the top."""
+    return [[p for p in pictures if p.row == row] for row in sorted({p.row for p in pictures})]

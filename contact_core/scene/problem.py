@@ -26,7 +26,8 @@ class Objective:
     """What is solved for, beside the contacts. The fields are those of `PoseProblem`; bodies are named as surfaces.
 
     pairs: the names of the pairs that count; all by default. bodies: surfaces that take part though no pair names
-    them: a hand that is dragged by a fingertip.
+    them: a hand that is dragged by a fingertip. length: of the manipulator, where it shall not be measured: a
+    hand's whose whole body may move.
     """
 
     terms: tuple[PoseTerm, ...] = field(default_factory=paper_terms)
@@ -36,6 +37,7 @@ class Objective:
     prior: Literal["rest", "current"] | Mapping[str, Pose] = "rest"
     pairs: tuple[str, ...] | None = None
     bodies: tuple[str, ...] = ()
+    length: float | None = None
 
 
 def problem_of(
@@ -75,6 +77,7 @@ def problem_of(
         held=objective.held,
         prior=objective.prior,
         limits=objective.limits,
+        length=objective.length,
     )
 
 

@@ -16,7 +16,10 @@ try:
 except ImportError as error:
     raise MissingExtra("The contract kit", "testing") from error
 
-SUITES = ("host", "solver", "term", "axis_generator", "brush", "engine", "command", "format")
+SUITES = (
+    "host", "solver", "term", "axis_generator", "brush", "engine", "command", "format",
+    "grasp_sampler", "grasp_score",
+)  # fmt: skip
 
 # Without this, an inherited test that fails prints a bare AssertionError instead of its values.
 pytest.register_assert_rewrite(f"{__name__}.host_clauses", *(f"{__name__}.{suite}_contract" for suite in SUITES))

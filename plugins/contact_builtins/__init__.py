@@ -42,6 +42,16 @@ def contact_placers() -> list[object]:
 
 
 @hookimpl
+def contact_grasp_samplers() -> list[object]:
+    return ["contact_builtins.grasps.around:Around"]
+
+
+@hookimpl
+def contact_grasp_scores() -> list[object]:
+    return ["contact_builtins.grasps.balanced:Balanced"]
+
+
+@hookimpl
 def contact_pose_solvers() -> list[object]:
     return [
         "contact_core.solve.levenberg_marquardt:LevenbergMarquardt",

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.scene.camera import LEGEND_AT, ROW, WIDEST_NAME, camera_of, legend_rows
-from contact_core.scene.picture import Picture
+from contact_core.scene.picture import Picture, sheet_rows
 from contact_viewer.scene_file import read_scene
 
 OVERSAMPLE = 2
@@ -39,22 +39,26 @@ def main(arguments: list[str]) -> int:
 
 
 def draw(pictures: list[Picture], size: tuple[int, int], path: Path) -> None:
-    """Draw pictures side by side; size in pixels of the PNG."""
+    """Draw pictures, those of a row side by side; size in pixels of the PNG."""
     import pyvista
 
     large = (size[0] * OVERSAMPLE, size[1] * OVERSAMPLE)
+    rows = sheet_rows(pictures)
+    columns = max(map(len, rows))
+    width, height = large[0] // columns, large[1] // len(rows)
     plotter = pyvista.Plotter(
-        off_screen=True, window_size=large, shape=(1, len(pictures)), border=False, lighting="none"
+        off_screen=True, window_size=large, shape=(len(rows), columns), border=False, lighting="none"
     )
     plotter.render_window.SetMultiSamples(0)
-    for place, picture in enumerate(pictures):
-        plotter.subplot(0, place)
+    places = [(row, column, p) for row, line in enumerate(rows) for column, p in enumerate(line)]
+    for row, column, picture in places:
+        plotter.subplot(row, column)
         plotter.set_background(_BOTTOM, top=_TOP)
-        _fill(plotter, pyvista, picture, aspect=size[0] / len(pictures) / size[1], pixels=large[1])
+        _fill(plotter, pyvista, picture, aspect=width / height, pixels=height)
     image = np.array(plotter.screenshot(return_img=True))  # (height, width, 3)
-    for place, picture in enumerate(pictures):
-        width = large[0] // len(pictures)
-        _colour_legend(image[:, place * width : (place + 1) * width], picture)
+    for row, column, picture in places:
+        own = image[row * height : (row + 1) * height, column * width : (column + 1) * width]
+        _colour_legend(own, picture)
     _save(image, path)
 
 

@@ -6,7 +6,6 @@ wins. Each pixel is drawn at twice the size and averaged, which is all the anti-
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from contact_builtins.renderers.png import write_png
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.scene.camera import LEGEND_AT, ROW, WIDEST_NAME, Camera, camera_of, legend_rows
-from contact_core.scene.picture import Picture, PictureMesh
+from contact_core.scene.picture import Picture, PictureMesh, sheet_rows
 
 OVERSAMPLE = 2
 _KEY_LIGHT = np.array([-0.45, 0.65, 0.75]) / np.linalg.norm([-0.45, 0.65, 0.75])  # camera axes
@@ -40,13 +39,23 @@ class SoftwareRenderer:
         return None
 
     def render(self, pictures: Sequence[Picture], path: Path, *, size: tuple[int, int] = (1280, 720)) -> None:
-        """Draw pictures side by side into one PNG. Raises InvalidInput, FileRefused."""
+        """Draw pictures, those of a row side by side, into one PNG. Raises InvalidInput, FileRefused."""
         if not pictures or min(size) < 16 or max(size) > 8192:
             raise InvalidInput(f"a picture needs content and 16 to 8192 pixels a side, but got {size}.")
-        edges = [size[0] * place // len(pictures) for place in range(len(pictures) + 1)]
-        widths = [right - left for left, right in itertools.pairwise(edges)]
-        panels = [draw(picture, (width, size[1])) for picture, width in zip(pictures, widths, strict=True)]
-        write_png(np.concatenate(panels, axis=1), path)
+        rows = sheet_rows(pictures)
+        bands = zip(rows, _parts(size[1], len(rows)), strict=True)
+        write_png(np.concatenate([_band(row, size[0], height) for row, height in bands]), path)
+
+
+def _parts(whole: int, count: int) -> list[int]:
+    """A length in whole parts, as equal as may be."""
+    return [whole * (place + 1) // count - whole * place // count for place in range(count)]
+
+
+def _band(pictures: Sequence[Picture], width: int, height: int) -> npt.NDArray[np.uint8]:
+    """Pictures side by side."""
+    panels = [draw(p, (own, height)) for p, own in zip(pictures, _parts(width, len(pictures)), strict=True)]
+    return np.concatenate(panels, axis=1)
 
 
 def draw(picture: Picture, size: tuple[int, int]) -> npt.NDArray[np.uint8]:

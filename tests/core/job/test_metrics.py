@@ -11,7 +11,7 @@ import pytest
 from contact_core.arrays import FloatArray
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job.metrics import Contact, PosedScene, bones_through, joint_changes, measure, skin_stretch
+from contact_core.grasping.metrics import Contact, PosedScene, bones_through, joint_changes, measure, skin_stretch
 from contact_core.testing.meshes import icosphere, plane
 
 LENGTH = 2.0

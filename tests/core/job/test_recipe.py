@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.job.recipe import ACCEPT
+from contact_core.grasping.verdict import ACCEPT
 from contact_core.job.recipe_reader import load_recipe, parse_recipe
 
 GOOD = """

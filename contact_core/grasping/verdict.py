@@ -6,7 +6,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from contact_core.job.recipe import ACCEPT
+import numpy as np
+
+# What a grasp must reach unless its recipe says otherwise; fractions, degrees, counts. The loosest of GRASP.
+ACCEPT: dict[str, tuple[str, float]] = {
+    "mean_contact_distance": ("<=", 0.025),
+    "p95_contact_distance": ("<=", 0.055),
+    "gap": ("<=", 0.015),
+    "opposed_normals": (">=", 0.92),
+    "opposed_normals_45": (">=", 0.52),
+    "worst_patch_opposed_45": (">=", 0.20),
+    "max_penetration": ("<=", 0.018),
+    "skin_inside": ("<=", 0.034),
+    "bones_through": ("<=", 0.0),
+    "skin_stretch_p99": ("<=", 1.6),
+    "max_joint_change_deg": ("<=", 120.0),
+}
 
 SCHEMA = 1
 _PER_LENGTH = ("mean_contact_distance", "p95_contact_distance", "gap", "max_penetration")
@@ -80,6 +95,37 @@ def judge(metrics: Mapping[str, Any], left_out: Mapping[str, str], accept: Mappi
     if 2 * len(left_out) >= len(left_out) + len(metrics["patches"]) > 0:
         failures.append("the hand is not near the object: at least half of its patches found no place")
     return Verdict(tuple(failures), failed, limits)
+
+
+# What a hold needs beside its contacts, by kind of grasp: digits that touch, closure, and of all the share of pads.
+DIGITS = {"power": 3, "precision": 3, "hook": 2, "lateral": 2, "pinch": 2}
+CLOSURE = {"power": 0.02, "precision": 0.01, "pinch": 0.0, "hook": -np.inf, "lateral": -np.inf}
+PADS_PLACED = {"power": 0.5, "precision": 0.6, "pinch": 0.6, "hook": 0.4, "lateral": 0.5}
+SKIN_THROUGH = 0.025
+UNEVEN = 75.0  # degrees
+
+
+def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
+    """What keeps a grasp from being a hold of its kind though its contacts may be good, in sentences."""
+    failures = []
+    digits, wanted = metrics["digits_in_contact"], min(DIGITS[kind], metrics["digits_wanted"])
+    if digits < wanted:
+        failures.append(f"only {digits} of {metrics['digits_wanted']} digits touch, a {kind} grasp wants {wanted}")
+    if not metrics["thumb_in_contact"]:
+        failures.append("the thumb touches nothing")
+    if metrics["pads_placed"] < PADS_PLACED[kind]:
+        share = f"{100 * metrics['pads_placed']:.0f} % of the pads"
+        failures.append(f"only {share} found a place, a {kind} grasp wants {100 * PADS_PLACED[kind]:.0f} %")
+    if metrics["closure"] < CLOSURE[kind]:
+        failures.append("the contacts do not hold the object: it would slip or turn out of the hand")
+    if metrics["skin_through"] > SKIN_THROUGH:
+        deep = f"{100 * metrics['skin_through']:.1f} % of the hand's length"
+        failures.append(
+            f"a digit's skin goes {deep} through the object's wall, wanted <= {100 * SKIN_THROUGH:.1f} %"
+        )
+    if metrics["uneven_curl_deg"] > UNEVEN:
+        failures.append(f"neighbouring fingers are bent {metrics['uneven_curl_deg']:.0f} degrees apart")
+    return tuple(failures)
 
 
 def holds(key: str, value: float, limit: float) -> bool:

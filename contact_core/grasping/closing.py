@@ -1,0 +1,80 @@
+"""Closing a hand at many placements at once: what `closing_kernels` computes, with its arrays made and named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.distance_field import DistanceField
+from contact_core.grasping.hand import Hand
+
+TOUCH = 0.004  # of the hand's length: nearer than this is touching
+OPPOSE = 0.06  # hand lengths that it is worth that the thumb's side of the object is not the fingers'
+
+
+@dataclass(frozen=True, eq=False)
+class Closed:
+    """Hands as they closed, N of them. placed: (N, 4, 4) object_from_rig. angles: (N, B). starts: (N, D).
+
+    fits: (N, B, 8) of the pad below each bone: distance to the object, cosine between its normal and the object's
+    outward one, that normal (3), its position (3). clear: (N, D) least signed distance of each digit. rest: (N,)
+    that of skin beside palm and digits, palm: (N,) of the palm's. travel: (N,) how far the approach went, inf
+    where it found nothing.
+    """
+
+    placed: FloatArray
+    angles: FloatArray
+    starts: IntArray
+    fits: FloatArray
+    clear: FloatArray
+    rest: FloatArray
+    palm: FloatArray
+    travel: FloatArray
+
+    def __getitem__(self, rows: IntArray) -> Closed:
+        return Closed(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+def close_hands(
+    hand: Hand,
+    field: DistanceField,
+    placed: FloatArray,
+    ways: FloatArray,
+    bars: FloatArray | None = None,
+    curls: FloatArray | None = None,
+    limits: FloatArray | None = None,
+    oppose: float = OPPOSE,
+) -> Closed:
+    """Approach and close at each of `placed` (N, 4, 4) object_from_rig, rigid, in surface units that hand and
+    object share.
+
+    ways: (N, 3) unit direction of each approach in the object's space, zero to stay. bars: (N, 7) middle, axis and
+    radius of the round bar on which fingers close in place of the whole object, radius 0 for the object.
+    curls: (N,) how far digits are bent before they close, of their limits. limits: (N, D) how far at most.
+    """
+    from contact_core.grasping.closing_kernels import close_all
+
+    n, bones, digits = len(placed), len(hand.joints), len(hand.bones) - 1
+    frames = np.ascontiguousarray(placed[:, :3, :], np.float64)
+    bars = np.zeros((n, 7)) if bars is None else np.ascontiguousarray(bars, np.float64)
+    curls = np.zeros(n) if curls is None else np.ascontiguousarray(curls, np.float64)
+    limits = np.ones((n, digits)) if limits is None else np.ascontiguousarray(limits, np.float64)
+    angles, starts = np.zeros((n, bones)), np.zeros((n, digits), np.int64)
+    fits, clear = np.zeros((n, bones, 8)), np.zeros((n, digits))
+    rest, palm, travel = np.zeros(n), np.zeros(n), np.zeros(n)
+    close_all(
+        frames, np.ascontiguousarray(ways, np.float64), bars, curls, limits, hand.bones, hand.links, hand.axes,
+        hand.low, hand.high, hand.flexes, hand.thumb, hand.starts, hand.start_counts, hand.start_angles,
+        hand.start_prices, hand.probes, hand.probe_bones, hand.probe_starts, hand.levers, hand.tested,
+        hand.tested_bones, hand.rest, hand.pads, hand.pad_normals, hand.has_pad, hand.capsules, hand.radii,
+        hand.room, field.values, field.origin, float(field.spacing), TOUCH * hand.length, float(hand.length),
+        float(oppose), angles, starts, fits, clear, rest, palm, travel, np.zeros((bones, 3, 3)), np.zeros(bones),
+        np.zeros((bones, 3, 4)), np.zeros((bones, 2, 3)), np.zeros(digits, bool), np.zeros(bones, bool),
+        np.zeros(bones, bool), np.zeros(bones), np.zeros(8), np.zeros(3), np.zeros(7), hand.firsts,
+        np.zeros(bones),
+    )  # fmt: skip
+    whole = np.tile(np.eye(4), (n, 1, 1))
+    whole[:, :3, :] = frames
+    return Closed(whole, angles, starts, fits, clear, rest, palm, travel)

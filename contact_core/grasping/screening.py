@@ -1,0 +1,100 @@
+"""A first look at many closed hands: how good each seems from its pads alone, and which are not like one
+another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact_core.arrays import BoolArray, FloatArray, IntArray
+from contact_core.geometry.distance_field import DistanceField
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
+from contact_core.geometry.transform import transform_points
+from contact_core.grasping.closing import TOUCH, Closed
+from contact_core.grasping.facts import enclosure
+from contact_core.grasping.hand import Hand, spread_out
+from contact_core.grasping.slots import Approaches
+
+FAR = 0.06  # hand lengths: a pad farther away is not on the object
+DEEP = 0.012  # hand lengths: skin this much deeper spoils a grasp
+SHALLOW = 0.004  # hand lengths that a solve makes good
+ALIKE = 0.016  # hand lengths: grasps whose hand sees the object so alike are one
+SEEN = 160  # points of the hand from which the object is seen
+TOUCHING = 0.02  # hand lengths
+
+
+def first_look(hand: Hand, mesh: TriangleMesh, approaches: Approaches, closed: Closed) -> FloatArray:
+    """(N,) the higher the better; -inf where the approach found nothing."""
+    used = approaches.limits >= 1.0  # (N, D)
+    digit = np.repeat(np.arange(len(hand.bones) - 1), np.diff(hand.bones))  # (B,)
+    pads = hand.has_pad[None] & used[:, digit]  # (N, B)
+    count = np.maximum(pads.sum(axis=1), 1)
+    distance = np.abs(closed.fits[:, :, 0]) / hand.length
+    fit = (np.minimum(distance / FAR, 1.0) * pads).sum(axis=1) / count
+    facing = ((1.0 + closed.fits[:, :, 1]) * pads).sum(axis=1) / (2.0 * count)
+    touches = (closed.clear < TOUCHING * hand.length) & used
+    contact = touches.sum(axis=1) / np.maximum(used.sum(axis=1), 1)
+    outwards = -closed.placed[:, None, :3, :3] @ hand.frame[:, 0]  # (N, 1, 3) the object's normal under the palm
+    normals = np.concatenate([closed.fits[:, :, 2:5], outwards], axis=1)
+    touched = np.concatenate([pads & (distance < 0.5 * FAR), closed.palm[:, None] < TOUCHING * hand.length], axis=1)
+    around = np.clip(enclosure(normals, touched.astype(float)), -0.5, 0.5)
+    deepest = np.minimum(np.minimum(closed.clear.min(axis=1), closed.palm), closed.rest)
+    sunk = np.clip((-deepest / hand.length - SHALLOW) / DEEP, 0.0, 5.0)
+    through = np.minimum(bones_crossing(hand, mesh, closed), 4)
+    held = np.array([kind in ("power", "hook") for kind in approaches.kinds])
+    palm = np.where(held, np.clip((closed.palm / hand.length - 2 * TOUCH) / 0.05, 0.0, 1.0), 0.0)
+    value = 1.2 * contact - fit - 0.8 * facing + 0.9 * around - 0.8 * sunk - 0.5 * palm - 0.5 * through
+    value = value - 0.35 * uneven(hand, closed.angles, used)
+    value = value - np.where((around < -0.1) & (np.array(approaches.kinds) != "hook"), 0.3, 0.0)
+    if hand.thumb >= 0:  # where it takes part, it shall touch
+        value = value - np.where(used[:, hand.thumb] & ~touches[:, hand.thumb], 0.5, 0.0)
+    return np.where(np.isfinite(closed.travel), value, -np.inf)
+
+
+def bones_crossing(hand: Hand, mesh: TriangleMesh, closed: Closed) -> IntArray:
+    """(N,) how many bones, metacarpals included, go through the object's surface: what a thin wall hides from
+    distances."""
+    frames = hand.frames(closed.placed, closed.angles, closed.starts)
+    ends = np.einsum("nbij,bej->nbei", frames[:, :, :3, :3], hand.capsules) + frames[:, :, None, :3, 3]
+    firsts = frames[:, hand.firsts][:, :, :3, 3]  # (N, D, 3)
+    hub = closed.placed @ np.append(hand.rig.rest_world[hand.description.hub, :3, 3], 1.0)
+    palm = np.stack([np.broadcast_to(hub[:, None, :3], firsts.shape), firsts], axis=2)
+    joined = np.stack([ends[:, :-1, 1], ends[:, 1:, 0]], axis=2)  # across the joints of a digit
+    joined = joined[:, np.setdiff1d(np.arange(len(hand.joints) - 1), hand.bones[1:-1] - 1)]
+    segments = np.concatenate([ends[:, hand.flexes], palm, joined], axis=1)
+    start, way = segments[:, :, 0].reshape(-1, 3), (segments[:, :, 1] - segments[:, :, 0]).reshape(-1, 3)
+    real = np.linalg.norm(way, axis=1) > 1e-9 * hand.length
+    crossed = np.zeros(len(way), bool)
+    crossed[real] = Locator.of(mesh).cast(start[real], way[real], max_distance=1.0).found
+    return np.asarray(crossed.reshape(len(closed.placed), -1).sum(axis=1))
+
+
+def uneven(hand: Hand, angles: FloatArray, used: BoolArray) -> FloatArray:
+    """(N,) the largest difference in bend of two neighbouring fingers that take part, in right angles."""
+    total = np.add.reduceat(np.where(hand.flexes, angles, 0.0), hand.bones[:-1], axis=1)  # (N, D)
+    fingers = [d for d in range(total.shape[1]) if d != hand.thumb]
+    both = used[:, fingers[1:]] & used[:, fingers[:-1]]
+    steps = np.where(both, np.abs(np.diff(total[:, fingers], axis=1)), 0.0)
+    return np.asarray(steps.max(axis=1, initial=0.0) / (np.pi / 2.0))
+
+
+def seen_from(hand: Hand, field: DistanceField, placed: FloatArray) -> FloatArray:
+    """(N, p) the signed distances of the object from fixed points of the hand: equal grasps of a symmetric object
+    see the same."""
+    tips = np.array([digit.tip for digit in hand.description.digits])
+    points = np.concatenate([hand.tested, tips, tips + 0.12 * hand.length * hand.frame[:, 0]])
+    points = points[spread_out(points, SEEN, 0)]
+    reach = 0.5 * hand.length
+    return np.array([np.clip(field.distances(transform_points(g, points)), -reach, reach) for g in placed])
+
+
+def distinct(seen: FloatArray, order: IntArray, count: int, length: float, alike: float = ALIKE) -> IntArray:
+    """The first `count` of `order` that are not like one already taken."""
+    taken: list[int] = []
+    for n in order:
+        gaps = [float(np.abs(seen[n] - seen[m]).mean()) for m in taken]
+        if not gaps or min(gaps) > alike * length:
+            taken.append(int(n))
+        if len(taken) >= count:
+            break
+    return np.array(taken, np.int64)

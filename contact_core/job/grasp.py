@@ -1,0 +1,255 @@
+"""`contact grasp`: from two files to a folder of grasps: a contact sheet, and a document, pose and model for
+each."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact_core._version import __version__
+from contact_core.arrays import FloatArray
+from contact_core.atomic_file import write_atomic
+from contact_core.atomic_set import check_writable, replacing_set
+from contact_core.document.asset import Asset
+from contact_core.document.schema import dump_document
+from contact_core.edit.command import apply_command
+from contact_core.errors import Cancelled, ContactError, InvalidInput
+from contact_core.geometry.transform import transform_points
+from contact_core.grasping.suggest import GraspScene, GraspSettings, Suggestion, suggest
+from contact_core.grasping.verdict import DEFINITIONS, spell
+from contact_core.hands.description import HandWords
+from contact_core.job.inputs import object_mesh
+from contact_core.job.recipe import AssetSource, ObjectSpec
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.reading import read_asset
+from contact_core.plugins.registry import FORMATS, RENDERERS
+from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.rig.pose_files import save_pose
+from contact_core.rig.rig import Pose
+from contact_core.scene.picture import Picture, PictureMesh
+from contact_core.session import Session
+from contact_core.solve.body import manipulator_length
+
+HAND, OBJECT = "manipulator", "object"
+SHEET, REPORT = "sheet.png", "report.json"
+COLUMNS = 4
+PANEL = (380, 340)  # pixels of one picture
+SKIN, THING = (0.84, 0.64, 0.53), (0.62, 0.69, 0.76)
+NEAR = 0.55  # hand lengths: how much of the object round the hand is in the frame
+SCHEMA = 1
+
+
+@dataclass(frozen=True, eq=False)
+class GraspJob:
+    """The two assets in one session. object: in the hand's units, scaled. notes: of what was read."""
+
+    session: Session
+    hand: Asset
+    object: Asset
+    words: tuple[HandWords, ...] = ()
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class GraspResult:
+    """Grasps, the best first, the content of report.json, and the files by role."""
+
+    grasps: tuple[Suggestion, ...]
+    report: dict[str, Any]
+    files: dict[str, Path]
+
+
+def grasp(
+    hand: str,
+    thing: str,
+    out: Path,
+    settings: GraspSettings,
+    *,
+    scale: float = 1.0,
+    plugins: PluginManager | None = None,
+    progress: Progress = NO_PROGRESS,
+) -> GraspResult:
+    """Suggest grasps of one file by the hand in another, and write them into `out`. scale: of the object.
+
+    Raises ContactError; then nothing is half-written. Cancelled when progress raises it.
+    """
+    plugins, out = plugins or PluginManager(), Path(out)
+    names = [SHEET, REPORT, *(name for k in range(64) for name in _names(k + 1).values())]
+    check_writable(out, names)
+    began = time.perf_counter()
+    job = prepare(hand, thing, scale, plugins)
+    scene = job.session.grasp_scene(HAND, OBJECT, job.words)
+    try:
+        found, first = [], 0.0
+        for one in suggest(scene, settings, progress.part(0.05, 0.85)):
+            first = first or time.perf_counter() - began
+            found.append(one)
+        found.sort(key=lambda one: -one.score)
+        seconds = {"first": round(first, 2), "all": round(time.perf_counter() - began, 2)}
+        return _written(job, scene, found, out, plugins, seconds, settings, progress)
+    except Cancelled as cancelled:
+        raise Cancelled("the search for grasps was cancelled; nothing was written.") from cancelled
+
+
+def prepare(hand: str, thing: str, scale: float, plugins: PluginManager) -> GraspJob:
+    """Both files in a session. Raises FileRefused, InvalidInput."""
+    manipulator, raw = read_asset(hand, plugins), read_asset(thing, plugins)
+    if manipulator.rig is None:
+        raise InvalidInput(f"{manipulator.name} has no skeleton, so it is no hand; give the hand first.")
+    unit = manipulator.rig.meters_per_unit
+    length = manipulator_length(manipulator.rig)
+    mesh = object_mesh(raw, ObjectSpec(AssetSource(file=str(thing)), scale=scale), unit, length)
+    name = f"{raw.name} (object)" if raw.name == manipulator.name else raw.name
+    placed = Asset(
+        name, mesh, None, raw.source_vertices, raw.source_faces, unit, raw.up_axis, raw.notes, raw.details
+    )
+    session = Session(plugins=plugins)
+    session.surfaces.add(HAND, manipulator.mesh, meters_per_unit=unit, rig=manipulator.rig)
+    session.surfaces.add(OBJECT, mesh, meters_per_unit=unit, up_axis=raw.up_axis)
+    words = tuple(HandWords(**each) for each in manipulator.details.get("hands", ()))
+    notes = [f"{asset.name}: {note}" for asset in (manipulator, raw) for note in asset.notes]
+    if raw.meters_per_unit is None:
+        notes.append(f"{raw.name} says no unit; the hand's was taken. Give --scale where it has another size.")
+    return GraspJob(session, manipulator, placed, words, notes)
+
+
+def _names(place: int) -> dict[str, str]:
+    return {
+        "document": f"grasp_{place}.json",
+        "pose": f"grasp_{place}.pose.json",
+        "model": f"grasp_{place}.glb",
+    }
+
+
+def _written(
+    job: GraspJob, scene: GraspScene, found: Sequence[Suggestion], out: Path, plugins: PluginManager,
+    seconds: dict[str, float], settings: GraspSettings, progress: Progress,
+) -> GraspResult:  # fmt: skip
+    names = [SHEET, REPORT, *(name for k in range(64) for name in _names(k + 1).values())]
+    with replacing_set(out, names) as stage:
+        for place, one in enumerate(found):
+            progress.tell(0.85 + 0.08 * place / max(len(found), 1), f"Writing grasp {place + 1}")
+            _write_one(job, one, stage, _names(place + 1), plugins)
+        progress.tell(0.93, "Drawing the contact sheet")
+        _draw(scene, found, stage / SHEET, plugins, job.notes)
+        report = report_of(job, scene, found, seconds, settings)
+        write_atomic(stage / REPORT, json.dumps(report, indent=2, allow_nan=False) + "\n")
+        written = {path.name: out / path.name for path in sorted(stage.iterdir())}
+        progress.tell(1.0, "Finishing")
+    return GraspResult(tuple(found), report, written)
+
+
+def _write_one(job: GraspJob, one: Suggestion, stage: Path, names: dict[str, str], plugins: PluginManager) -> None:
+    document = apply_command(one.proposal.command, job.session.document)
+    pose = document.poses[HAND]
+    write_atomic(stage / names["document"], dump_document(document))
+    save_pose(stage / names["pose"], pose, rig=job.session.rigs[HAND].name)
+    writers = [f for f in plugins.offers(FORMATS).values() if f.can_write and ".glb" in f.suffixes]
+    if writers:
+        standing = Pose((job.object.name,), np.eye(4)[None])
+        poses = {job.hand.name: pose, job.object.name: standing}
+        writers[0].write(stage / names["model"], [job.hand, job.object], poses)
+
+
+def _draw(
+    scene: GraspScene, found: Sequence[Suggestion], path: Path, plugins: PluginManager, notes: list[str]
+) -> None:
+    """The contact sheet by the best renderer that can."""
+    pictures = sheet(scene, found)
+    columns = min(COLUMNS, len(found))
+    size = (PANEL[0] * columns, PANEL[1] * (1 + max(p.row for p in pictures)))
+    for renderer in sorted(plugins.offers(RENDERERS).values(), key=lambda r: (-r.priority, r.name)):
+        try:
+            renderer.render(pictures, path, size=size)
+        except ContactError as error:
+            notes.append(f"renderer {renderer.name}: {error}")
+        else:
+            return
+    notes.append("no renderer could draw a picture; everything else was written.")
+
+
+def sheet(scene: GraspScene, found: Sequence[Suggestion]) -> list[Picture]:
+    """Every grasp from two sides, one below the other, so many in a row as fit."""
+    pictures = []
+    for place, one in enumerate(found):
+        for side in (0, 1):
+            row = 2 * (place // COLUMNS) + side
+            pictures.append(_picture(scene, one, place + 1, side, row))
+    return sorted(pictures, key=lambda picture: picture.row)
+
+
+def _picture(scene: GraspScene, one: Suggestion, place: int, side: int, row: int) -> Picture:
+    hand = scene.hand
+    digits = one.skin.points[np.concatenate(hand.skin_of_digits)]
+    palm = transform_points(one.placed, hand.tested) if len(hand.tested) else digits
+    seen = np.concatenate([digits, palm])
+    near = scene.mesh.points[np.linalg.norm(scene.mesh.points - digits.mean(axis=0), axis=1) < NEAR * hand.length]
+    up = np.eye(3)[1]
+    across = np.cross(one.way, up)
+    across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.2 else np.eye(3)[0]
+    lift = np.cross(across, one.way)
+    lift = lift * (1.0 if lift @ up >= 0 else -1.0)
+    eye: FloatArray = across + 0.35 * one.way + 0.25 * lift if side == 0 else -across - 0.45 * one.way + 0.3 * lift
+    word = "" if one.is_grasp else " - NOT good"
+    caption = f"{place}. {one.kind}{word}" if side == 0 else f"   {spell('gap', one.facts.metrics['gap'])} gap"
+    return Picture(
+        meshes=(PictureMesh(one.skin, SKIN), PictureMesh(scene.mesh, THING)),
+        camera_from=tuple(eye.tolist()), caption=caption, focus=np.concatenate([seen, near]), row=row,
+    )  # fmt: skip
+
+
+def report_of(
+    job: GraspJob,
+    scene: GraspScene,
+    found: Sequence[Suggestion],
+    seconds: dict[str, float],
+    settings: GraspSettings,
+) -> dict[str, Any]:
+    """The content of report.json."""
+    return {
+        "schema": "contact.grasps",
+        "version": SCHEMA,
+        "contact_core": __version__,
+        "hand": job.hand.name,
+        "object": job.object.name,
+        "hand_length": scene.hand.length,
+        "meters_per_unit": scene.rig.meters_per_unit,
+        "seed": settings.seed,
+        "summary": summary(found),
+        "seconds": seconds,
+        "grasps": [_entry(one, place + 1) for place, one in enumerate(found)],
+        "notes": [*job.notes, *scene.hand.description.notes],
+        "definitions": DEFINITIONS,
+    }
+
+
+def summary(found: Sequence[Suggestion]) -> str:
+    """One sentence: how many good grasps there are, and where there is none what keeps the best from being one."""
+    good = sum(one.is_grasp for one in found)
+    if good:
+        return f"{good} good grasp{'s' if good > 1 else ''} of {len(found)} shown."
+    if not found:
+        return "No grasp was found: the hand reaches the object nowhere with two pads."
+    return f"No good grasp was found; the best of {len(found)} fails: {found[0].verdict.failures[0]}."
+
+
+def _entry(one: Suggestion, place: int) -> dict[str, Any]:
+    return {
+        "place": place,
+        "kind": one.kind,
+        "verdict": "grasp" if one.is_grasp else "bad",
+        "failures": list(one.verdict.failures),
+        "score": one.score,
+        "closure": one.facts.closure,
+        "comfort": one.facts.comfort,
+        "clearance": one.facts.clearance,
+        **one.facts.metrics,
+        "left_out": dict(one.left_out),
+        "files": _names(place),
+    }

@@ -1,0 +1,106 @@
+"""Closing a hand: it touches and does not sink, it does not matter where all stands, and frames are those of
+poses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contact_core.geometry.distance_field import DistanceField
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.grasping.closing import TOUCH, Closed, close_hands
+from contact_core.grasping.hand import Hand
+from contact_core.rig.rig import forward_kinematics
+from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
+
+N = 24
+
+
+def placements(one: Hand, mesh: TriangleMesh, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """N hands round an object, palms towards its middle."""
+    random = np.random.default_rng(seed)
+    placed, ways = np.tile(np.eye(4), (N, 1, 1)), np.zeros((N, 3))
+    for n in range(N):
+        way = random.normal(size=3)
+        way /= np.linalg.norm(way)
+        ahead = np.cross(way, random.normal(size=3))
+        ahead /= np.linalg.norm(ahead)
+        turn = np.stack([way, ahead, np.cross(way, ahead)], axis=1) @ one.frame.T
+        placed[n, :3, :3] = turn
+        middle = mesh.points.mean(axis=0)
+        placed[n, :3, 3] = middle - turn @ (one.description.palm.point + 0.2 * one.length * one.frame[:, 1])
+        placed[n, :3, 3] -= 0.4 * one.length * way
+        ways[n] = way
+    return placed, ways
+
+
+def closed_on(name: str, shift: np.ndarray | None = None) -> Closed:
+    one, mesh = hand(), thing(name)
+    if shift is not None:
+        mesh = TriangleMesh(mesh.points + shift, mesh.faces)
+    placed, ways = placements(one, mesh)
+    return close_hands(one, DistanceField.of(mesh, resolution=40), placed, ways)
+
+
+@pytest.mark.parametrize("name", ["ball", "rod", "slab"])
+def test_what_closes_touches_and_does_not_sink(name: str) -> None:
+    closed, one = closed_on(name), hand()
+    reached = np.isfinite(closed.travel)
+    assert reached.mean() > 0.9
+    assert (closed.palm[reached] > -0.5 * TOUCH * one.length).all(), "the approach ends at the skin"
+    step = np.radians(1.0) * one.levers.max()  # the least step may overshoot by so much
+    touches = closed.clear[reached] < TOUCH * one.length
+    assert (closed.clear[reached] > -step - TOUCH * one.length).mean() > 0.9
+    assert (touches.sum(axis=1) >= 2).mean() > 0.5, "most digits find what they close on"
+
+
+def test_joints_keep_their_limits() -> None:
+    closed, one = closed_on("ball"), hand()
+    bends = one.flexes.copy()
+    bends[one.bones[one.thumb] : one.bones[one.thumb + 1]] = False  # a thumb's first joint starts where it likes
+    assert (closed.angles[:, bends] <= one.high[bends] + 1e-9).all()
+    assert (closed.angles[:, bends] >= one.low[bends] - 1e-9).all()
+
+
+def test_where_all_stands_does_not_matter() -> None:
+    here, there = closed_on("slab"), closed_on("slab", np.array([100.0, -30.0, 7.0]))
+    assert np.abs(here.angles - there.angles).max() < np.radians(1.5)
+    assert np.array_equal(here.starts, there.starts)
+
+
+def test_frames_are_those_of_the_pose() -> None:
+    closed, one = closed_on("ball"), hand()
+    frames = one.frames(closed.placed, closed.angles, closed.starts)
+    for n in (0, N // 2):
+        pose = one.pose(closed.placed[n], closed.angles[n], closed.starts[n])
+        world = forward_kinematics(one.rig.parents, pose.local)
+        assert np.allclose(world[one.joints], frames[n], atol=1e-9)
+
+
+def test_a_limit_of_nothing_keeps_a_digit_open() -> None:
+    asked = request_for("ball")
+    one = hand()
+    placed, ways = placements(one, asked.mesh)
+    limits = np.ones((N, len(one.bones) - 1))
+    limits[:, 1] = 0.0
+    closed = close_hands(one, asked.field, placed, ways, limits=limits)
+    still = slice(int(one.bones[1]), int(one.bones[2]))
+    assert np.abs(closed.angles[:, still]).max() < 1e-12
+    assert np.abs(closed.angles[:, int(one.bones[2]) : int(one.bones[3])]).max() > 0.1
+
+
+def test_fingers_keep_out_of_one_another() -> None:
+    """The capsules of different digits are nowhere nearer than they may be by more than one step."""
+    closed, one = closed_on("rod"), hand()
+    frames = one.frames(closed.placed, closed.angles, closed.starts)
+    ends = np.einsum("nbij,bej->nbei", frames[:, :, :3, :3], one.capsules) + frames[:, :, None, :3, 3]
+    step = 2.0 * np.radians(1.0) * one.levers.max()
+    share = np.linspace(0.0, 1.0, 9)[:, None]
+    deepest = 0.0
+    for n in range(N):
+        lines = ends[n, :, None, 0] * (1.0 - share) + ends[n, :, None, 1] * share  # (B, 9, 3)
+        gap = np.linalg.norm(lines[:, None, :, None] - lines[None, :, None, :], axis=-1).min(axis=(2, 3))
+        fingers = np.arange(len(one.joints)) >= one.bones[1]  # a thumb's start may begin among them
+        pairs = (one.room > 0.0) & fingers[:, None] & fingers[None]
+        deepest = max(deepest, float((one.room - gap)[pairs].max()))
+    assert deepest < step + 0.02 * one.length

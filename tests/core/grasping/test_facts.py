@@ -1,0 +1,96 @@
+"""What an eye sees: closure and enclosure of contacts, skin through a thin wall, verdicts in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
+from contact_core.grasping.facts import closure, contact_wrenches, digits_in_contact, enclosure, skin_through
+from contact_core.grasping.slots import KINDS
+from contact_core.grasping.verdict import judge_hold
+from contact_core.rig.rig import skin
+from contact_core.testing import meshes
+from contact_core.testing.grasp_sampler_contract import hand
+from contact_core.testing.grasp_score_contract import GOOD
+
+
+def cap(direction: np.ndarray, below: float) -> TriangleMesh:
+    """Part of a sphere a little larger than the unit ball, facing it: as skin that lies on it does."""
+    ball = meshes.icosphere(3)
+    keep = (ball.points[ball.faces].mean(axis=1) @ direction) > below
+    return TriangleMesh(1.001 * ball.points, ball.faces[keep][:, ::-1])
+
+
+def test_what_surrounds_a_ball_holds_it_and_what_lies_on_one_side_does_not() -> None:
+    ball = meshes.icosphere(3)
+    up = np.array([0.0, 0.0, 1.0])
+    round_it = closure(contact_wrenches(cap(up, -2.0), ball, 4.0))
+    on_top = closure(contact_wrenches(cap(up, 0.85), ball, 4.0))
+    assert round_it > 0.05 > 0.0 > on_top
+    assert closure(np.zeros((0, 6))) == -1.0
+
+
+def test_closure_does_not_ask_where_the_object_stands() -> None:
+    ball = meshes.icosphere(3)
+    moved = np.array([5.0, -2.0, 1.0])
+    own = cap(np.array([0.0, 0.0, 1.0]), -0.5)
+    here = closure(contact_wrenches(own, ball, 4.0))
+    there = closure(
+        contact_wrenches(
+            TriangleMesh(own.points + moved, own.faces), TriangleMesh(ball.points + moved, ball.faces), 4.0
+        )
+    )
+    assert here == pytest.approx(there, rel=0.05)
+
+
+def test_enclosure_is_positive_only_where_no_way_out_is_free() -> None:
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+    two_sided = np.array([[0, 0, 1.0], [0, 0, -1.0], [0, 0, 1.0], [0, 0, -1.0]])
+    values = enclosure(np.stack([corners, two_sided, np.abs(corners)]), np.ones((3, 4)))
+    assert values[0] > 0.2 and values[1] < 0.2 and values[2] < 0.0
+
+
+def test_skin_beyond_a_thin_wall_is_seen_and_skin_beside_it_is_not() -> None:
+    """A sheet of no thickness through a finger: no vertex is inside anything, and yet half the finger is
+    through."""
+    one = hand()
+    posed = skin(one.rig, one.rig.rest_world)
+    middle = one.rig.rest_world[one.joints[int(one.bones[3]) - 1], :3, 3]
+    sheet = meshes.plane(12)
+    flat = (sheet.points - np.array([0.5, 0.5, 0.0])) * np.array([6.0, 6.0, 1.0])
+    level = flat[:, [0, 2, 1]] + middle  # across y, as the palm is
+
+    def through(offset: float) -> float:
+        moved = TriangleMesh(level + np.array([0.0, offset, 0.0]), sheet.faces)
+        return float(skin_through(one, posed, one.rig.rest_world, moved).max())
+
+    assert through(-3.0) == 0.0 and through(0.3) > 0.2
+    assert through(0.6) < through(0.3)
+
+
+def test_digits_that_touch_are_counted() -> None:
+    one = hand()
+    posed = skin(one.rig, one.rig.rest_world)
+    tip = one.description.fingers[0].tip
+    ball = meshes.icosphere(2)
+    touching = digits_in_contact(one, posed, Locator.of(TriangleMesh(0.8 * ball.points + tip, ball.faces)))
+    assert touching[1] and touching.sum() == 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_good_hold_has_no_failure_and_each_fault_is_named(kind: str) -> None:
+    assert judge_hold(GOOD, kind) == ()
+    faults = {
+        "digits_in_contact": (0, "touch"),
+        "thumb_in_contact": (False, "thumb"),
+        "pads_placed": (0.1, "pads"),
+        "skin_through": (0.06, "wall"),
+        "uneven_curl_deg": (150.0, "bent"),
+    }
+    for key, (value, word) in faults.items():
+        told = judge_hold({**GOOD, key: value}, kind)
+        assert len(told) == 1 and word in told[0], (key, told)
+    if kind == "power":
+        assert "hold" in judge_hold({**GOOD, "closure": -0.2}, kind)[0]

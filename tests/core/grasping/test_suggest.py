@@ -1,0 +1,99 @@
+"""From two files to grasps: the same for the same seed, ordinary documents, one undo step, and no surprises."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contact_core.cli import main
+from contact_core.document.schema import parse_document as load_document
+from contact_core.errors import Cancelled, InvalidInput
+from contact_core.grasping.suggest import GraspSettings, Suggestion
+from contact_core.job.grasp import HAND, OBJECT, grasp, prepare
+from contact_core.plugins.manager import PluginManager
+from contact_core.progress import CallbackProgress
+from contact_core.session import Session
+
+SETTINGS = GraspSettings(count=2, sampler_settings={"places": 30, "most": 160})
+
+
+@pytest.fixture(scope="module")
+def session() -> Session:
+    return prepare("sample:human_hand", "sample:baseball", 1.0, PluginManager()).session
+
+
+@pytest.fixture(scope="module")
+def found(session: Session) -> list[Suggestion]:
+    return list(session.suggest(HAND, OBJECT, settings=SETTINGS))
+
+
+def test_grasps_pass_and_are_accepted_as_one_step(session: Session, found: list[Suggestion]) -> None:
+    assert len(found) == 2 and found[0].is_grasp, [one.verdict.failures for one in found]
+    before, revision = session.document, session.revision
+    session.accept(found[0].proposal)
+    document = session.document
+    assert len(document.pairs) >= 4 and HAND in document.poses
+    assert {pair.object for pair in document.pairs.values()} <= set(document.patches)
+    session.undo()
+    assert session.document == before or session.document.pairs == before.pairs
+    assert session.revision == revision or not session.document.pairs
+
+
+def test_a_grasp_is_no_other(found: list[Suggestion]) -> None:
+    assert np.abs(found[0].seen - found[1].seen).mean() > 1e-3 * np.abs(found[0].seen).mean()
+
+
+def test_the_same_seed_gives_the_same_grasps(session: Session, found: list[Suggestion]) -> None:
+    again = next(iter(session.suggest(HAND, OBJECT, settings=SETTINGS)))
+    assert again.score == found[0].score
+    assert np.array_equal(again.skin.points, found[0].skin.points)
+
+
+def test_who_cancels_gets_nothing_written(tmp_path: Path) -> None:
+    def stop(fraction: float | None, text: str) -> None:
+        if text.startswith("Solving"):
+            raise Cancelled("stop.")
+
+    with pytest.raises(Cancelled, match="nothing was written"):
+        grasp("sample:human_hand", "sample:baseball", tmp_path / "out", SETTINGS, progress=CallbackProgress(stop))
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_writes_documents_that_load(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    line = ["grasp", "sample:human_hand", "sample:baseball", "--count", "1", "--kind", "power", "--out", str(out)]
+    assert main([*line, "--check", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)["report"]
+    assert report["summary"].startswith("1 good grasp")
+    (entry,) = report["grasps"]
+    document = load_document((out / entry["files"]["document"]).read_bytes())
+    assert len(document.pairs) >= 4
+    assert (out / "sheet.png").stat().st_size > 5000 and (out / entry["files"]["model"]).stat().st_size > 5000
+    assert json.loads((out / "report.json").read_text(encoding="utf-8"))["grasps"] == report["grasps"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["sample:baseball", "sample:human_hand"], "no skeleton"),
+        (["sample:human_hand", "sample:mug", "--kind", "grip"], "a grasp is one of power"),
+        (["sample:human_hand", "sample:mug", "--count", "0"], "from 1 to 64"),
+        (["sample:human_hand", "sample:mug", "--seed", "-1"], "the seed is"),
+        (["sample:human_hand", "sample:mug", "--scale", "1e9"], "lengths of the manipulator"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_a_sentence(
+    words: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["grasp", *words, "--out", str(tmp_path / "out")]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_only_a_hand_can_grasp(session: Session) -> None:
+    with pytest.raises(InvalidInput, match="no hand"):
+        next(iter(session.suggest(OBJECT, HAND)))
+    with pytest.raises(InvalidInput, match="bends"):
+        next(iter(session.suggest(HAND, HAND)))
