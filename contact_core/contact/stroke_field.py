@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray, frozen
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, NotManifold
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
@@ -55,12 +55,22 @@ class StrokeField:
         if not len(near):
             return replace(self, changed=near)
         targets = SurfacePoints.at_vertices(self.mesh, near)
-        distance = log_map(self.mesh, points, targets, max_distance=self.reach).distance
+        distance = self._distances(points, targets)
         lower = (distance < self.distances[near]) & (distance <= self.reach)
         distances = self.distances.copy()
         distances[near[lower]] = distance[lower]
         distances.setflags(write=False)
         return replace(self, distances=distances, changed=frozen(near[lower], np.int64, (None,), "changed"))
+
+    def _distances(self, points: SurfacePoints, targets: SurfacePoints) -> FloatArray:
+        """(k,) from points to targets over the surface; straight ones where it is broken, which a preview may show."""
+        try:
+            return log_map(self.mesh, points, targets, max_distance=self.reach).distance
+        except NotManifold:
+            from scipy.spatial import cKDTree
+
+            tree = cKDTree(points.positions(self.mesh))
+            return np.asarray(tree.query(targets.positions(self.mesh))[0])
 
     def covered(self) -> IntArray:
         """The vertices (k,) within the radius of the stroke."""

@@ -116,6 +116,11 @@ class DocumentGeometry:
         """The mesh that the contacts of a surface run on: its proxy where it has one, else its own."""
         return self._derived.carrier(self.document, surface)
 
+    def posed_carrier(self, surface: str, posed: TriangleMesh) -> TriangleMesh:
+        """The same as it follows a posed mesh of the surface: the proxy posed, or that mesh itself."""
+        found = self._derived.map(self.document, surface)
+        return posed if found is None else found.followed(posed)
+
     def on_carrier(self, surface: str, points: SurfacePoints) -> SurfacePoints:
         """Points of a surface, checked, on the mesh that its contacts run on. Raises InvalidInput."""
         self.check_points(surface, points)

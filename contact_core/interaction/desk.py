@@ -12,6 +12,7 @@ import numpy as np
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.edit.editor import Makers
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import Handle, handle_under
 from contact_core.interaction.seen import Hit, SeenScene
@@ -152,7 +153,7 @@ class Desk:
 
     def together(self) -> Together:
         """An editor that gathers several verbs, from the document at the press, for `preview`."""
-        return Together(self.stroke.document, self.session.derived, self.session.rigs)
+        return Together(self.stroke.document, self.session.derived, self.session.rigs, self.session.makers)
 
     def preview(self, title: str, gathered: Together) -> None:
         """Preview what was gathered as one step. Raises CommandRejected."""
@@ -183,8 +184,10 @@ class Desk:
 class Together(Draft):
     """A draft that remembers its commands."""
 
-    def __init__(self, document: ContactDocument, derived: Derived, rigs: Mapping[str, Rig]) -> None:
-        super().__init__(document, derived, rigs)
+    def __init__(
+        self, document: ContactDocument, derived: Derived, rigs: Mapping[str, Rig], makers: Makers | None = None
+    ) -> None:
+        super().__init__(document, derived, rigs, makers=makers)
         self.commands: list[Command] = []
 
     def do(self, command: Command, *, origin: str = "user") -> None:

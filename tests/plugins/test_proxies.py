@@ -12,6 +12,7 @@ import pytest
 import contact_core as contact
 from contact_builtins.proxies.level_set import LevelSetProxy
 from contact_core.contact.brush import BrushGesture
+from contact_core.contact.stroke_field import StrokeField
 from contact_core.document.asset import Asset
 from contact_core.document.schema import dump_document, parse_document
 from contact_core.errors import InvalidInput, NotManifold
@@ -299,6 +300,21 @@ def test_a_mesh_without_extent_has_no_proxy() -> None:
     point = TriangleMesh(np.zeros((3, 3)), [[0, 1, 2]])
     with pytest.raises(InvalidInput, match="extent"):
         LevelSetProxy().make(point, NO_PROGRESS)
+
+
+def test_a_stroke_over_a_broken_mesh_is_one_step_and_previewed_by_straight_distances() -> None:
+    mesh = broken("fin")
+    with session_on(mesh) as session:
+        beside = Locator.of(mesh).closest(0.75 * at_the_fin(mesh)[None]).points
+        field = StrokeField.begun(mesh, 0.3).extended(beside)
+        away = np.linalg.norm(mesh.points - beside.positions(mesh), axis=1)
+        assert len(field.covered()) and np.allclose(field.distances[field.covered()], away[field.covered()])
+        steps = len(session.history.steps)
+        with session.stroke() as stroke:
+            for radius in (0.2, 0.3):
+                stroke.patches.brush("disk", "spot", surface="thing", at=beside, radius=radius)
+        assert len(session.history.steps) == steps + 1
+        assert session.document.surface("thing").proxy is not None and len(session.geometry.points("spot"))
 
 
 def test_contacts_do_not_slide_on_a_proxy_but_say_so() -> None:

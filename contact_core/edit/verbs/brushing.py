@@ -92,7 +92,7 @@ class BrushVerbs(PaintingVerbs):
         found = self._editor.derived.map(self._document, surface)
         if found is None:
             return gesture
-        seen = None if gesture.seen is None else found.followed(gesture.seen)
+        seen = None if gesture.seen is None else self._geometry.posed_carrier(surface, gesture.seen)
         path = found.to_proxy(gesture.path) if len(gesture.path) else gesture.path
         return replace(gesture, mesh=found.proxy, path=path, seen=seen)
 

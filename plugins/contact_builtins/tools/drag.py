@@ -65,7 +65,7 @@ def root_handle(desk: Desk, patch: str) -> Handle | None:
     seen = desk.scene.surfaces.get(desk.document.patch(patch).surface)
     if seen is None:
         return None
-    return Handle("root", "root", seen.positions(desk.shown.root(patch).point())[0])
+    return Handle("root", "root", seen.positions(desk.shown.axis_points(patch))[0])
 
 
 def axis_handles(desk: Desk, patch: str) -> tuple[tuple[int, Handle], ...]:
@@ -74,7 +74,7 @@ def axis_handles(desk: Desk, patch: str) -> tuple[tuple[int, Handle], ...]:
     seen = desk.scene.surfaces.get(desk.document.patch(patch).surface)
     if seen is None:
         return ()
-    at = seen.positions(desk.shown.axis(patch).points)  # (m, 3)
+    at = seen.positions(desk.shown.axis_points(patch))  # (m, 3)
     screen = desk.view.project(at)[:, :2]
     gap, last = desk.settings.handle_gap * desk.view.pixel_ratio, len(at) - 1
     chosen = [0]

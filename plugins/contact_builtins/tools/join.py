@@ -73,7 +73,7 @@ class Linking(Joining):
             return
         parent, hit = found
         seen = desk.scene.surfaces[hit.surface]
-        away = np.linalg.norm(seen.positions(desk.shown.axis(parent).points) - hit.position, axis=1)
+        away = np.linalg.norm(seen.positions(desk.shown.axis_points(parent)) - hit.position, axis=1)
         desk.stroke.patches.link(self.first, parent, parent_point=int(away.argmin()))
 
 
@@ -141,6 +141,6 @@ def _link_lines(desk: Desk) -> Overlay:
     for patch in desk.document.patches.values():
         seen = desk.scene.surfaces.get(patch.surface)
         if isinstance(patch.placement, Link) and seen is not None:
-            ends = (desk.shown.root(name).point() for name in (patch.name, patch.placement.parent))
+            ends = (desk.shown.axis_points(name)[0] for name in (patch.name, patch.placement.parent))
             lines.append(AxisLine(np.concatenate([seen.positions(end) for end in ends]), patch.color, arrow=True))
     return Overlay(axes=tuple(lines)) if lines else NOTHING

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from contact_core.contact.axis import Axis
 from contact_core.contact.linkage import follow_link, link_to
 from contact_core.contact.placement import Root
 from contact_core.contact.transfer import transported
+from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.errors import CommandRejected
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tangent import heading_to_direction
 from contact_core.interaction.desk import Desk
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import Overlay
@@ -59,7 +61,8 @@ class Moving(Drag):
         self.patch, self.surface = patch, desk.document.patch(patch).surface
         self.grip = None
         if grabbed is not None:
-            self.grip = Grip(desk.shown.mesh_of(patch), desk.shown.root(patch), grabbed)
+            held = desk.shown.on_carrier(self.surface, grabbed)
+            self.grip = Grip(desk.shown.carrier_of(patch), desk.shown.root(patch), held)
 
     def drag(self, pointer: Pointer) -> None:
         hit = self.hit(pointer, self.surface)
@@ -68,8 +71,9 @@ class Moving(Drag):
         if self.grip is None:
             self.desk.stroke.patches.translate(self.patch, hit.point)
         else:
-            root = self.grip.moved_to(hit.point)
-            self.desk.stroke.patches.place(self.patch, root.point(), heading=root.heading)
+            root = self.grip.moved_to(self.desk.shown.on_carrier(self.surface, hit.point))
+            point, way = as_seen(self.desk.shown, self.surface, root)
+            self.desk.stroke.patches.place(self.patch, point, **way)
 
 
 class Grip:
@@ -120,12 +124,15 @@ class Turning(Drag):
     def __init__(self, desk: Desk, pointer: Pointer, patch: str, grabbed: SurfacePoints, step: float) -> None:
         super().__init__(desk, pointer)
         self.patch, self.surface, self.step = patch, desk.document.patch(patch).surface, step
-        self.mesh, self.root, self.angle = desk.shown.mesh_of(patch), desk.shown.root(patch), 0.0
-        self.first = heading_to(self.mesh, self.root.point(), grabbed) or self.root.heading
+        self.mesh, self.root, self.angle = desk.shown.carrier_of(patch), desk.shown.root(patch), 0.0
+        held = desk.shown.on_carrier(self.surface, grabbed)
+        self.first = heading_to(self.mesh, self.root.point(), held) or self.root.heading
 
     def drag(self, pointer: Pointer) -> None:
         hit = self.hit(pointer, self.surface)
-        heading = None if hit is None else heading_to(self.mesh, self.root.point(), hit.point)
+        if hit is None:
+            return
+        heading = heading_to(self.mesh, self.root.point(), self.desk.shown.on_carrier(self.surface, hit.point))
         if heading is None:
             return
         angle = cmath.phase(heading / self.first)
@@ -137,6 +144,15 @@ class Turning(Drag):
 
     def hint(self) -> str:
         return f"{math.degrees(self.angle):.0f} degrees"
+
+
+def as_seen(shown: DocumentGeometry, surface: str, root: Root) -> tuple[SurfacePoints, dict[str, Any]]:
+    """A root as verbs take it: a point of the mesh that is seen, with a heading there; with a direction in space
+    where contacts run on a proxy."""
+    if shown.carrier(surface) is shown.mesh(surface):
+        return root.point(), {"heading": root.heading}
+    direction = heading_to_direction(shown.carrier(surface), root.point(), np.array([root.heading]))[0]
+    return shown.seen(surface, root.point()), {"direction": direction}
 
 
 def heading_to(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoints) -> complex | None:

@@ -40,14 +40,14 @@ class Bend:
             taken = desk.handle_at(pointer, [handle for _, handle in handles])
             if taken is not None:
                 point = next(point for point, handle in handles if handle is taken)
-                return Bending(desk, pointer, active, point, desk.shown.axis(active).points[point])
+                return Bending(desk, pointer, active, point, desk.shown.axis_points(active)[point])
         found = patch_under(desk, pointer)
         if found is None:
             return None
         patch, hit = found
         desk.take(patch)
         seen = desk.scene.surfaces[hit.surface]
-        away = np.linalg.norm(seen.positions(desk.shown.axis(patch).points) - hit.position, axis=1)
+        away = np.linalg.norm(seen.positions(desk.shown.axis_points(patch)) - hit.position, axis=1)
         return Bending(desk, pointer, patch, int(away.argmin()), hit.point)
 
 
@@ -63,13 +63,16 @@ class Bending(Drag):
                 f"the axis of {patch!r} has no point between its ends to bend at: draw a longer one."
             )
         pivot, self.shares = spread_over([point for point, _ in axis_handles(desk, patch)], grabbed, last)
-        self.mesh, axis = desk.shown.mesh_of(patch), desk.shown.axis(patch)
+        self.mesh, axis = desk.shown.carrier_of(patch), desk.shown.axis(patch)
         self.pivot = axis.points[pivot]
-        self.first = heading_to(self.mesh, self.pivot, held) or complex(axis.tangents[pivot])
+        first = heading_to(self.mesh, self.pivot, desk.shown.on_carrier(self.surface, held))
+        self.first = first or complex(axis.tangents[pivot])
 
     def drag(self, pointer: Pointer) -> None:
         hit = self.hit(pointer, self.surface)
-        heading = None if hit is None else heading_to(self.mesh, self.pivot, hit.point)
+        if hit is None:
+            return
+        heading = heading_to(self.mesh, self.pivot, self.desk.shown.on_carrier(self.surface, hit.point))
         if heading is None:
             return
         self.angle = cmath.phase(heading / self.first)

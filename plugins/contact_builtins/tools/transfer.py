@@ -9,9 +9,11 @@ import numpy as np
 
 from contact_builtins.tools.drag import Drag, patch_under
 from contact_builtins.tools.join import in_order
-from contact_builtins.tools.move import heading_to
+from contact_builtins.tools.move import as_seen, heading_to
 from contact_core.arrays import FloatArray
-from contact_core.errors import ContactError
+from contact_core.contact.placement import Root
+from contact_core.errors import ContactError, NotManifold
+from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import heading_to_direction
 from contact_core.interaction.desk import Desk, Together
 from contact_core.interaction.events import Pointer
@@ -85,17 +87,27 @@ class Transferring(Drag):
     def drag(self, pointer: Pointer) -> None:
         far = float(np.linalg.norm(pointer.pixel - self.start.pixel)) > 6.0 * self.desk.view.pixel_ratio
         end = self.hit(pointer, self.root.surface) if far else None
-        heading = None
-        if end is not None:
-            heading = heading_to(self.desk.shown.mesh(self.root.surface), self.root.point, end.point)
         together = self.desk.together()
-        given: dict[str, Any] = {"direction": self.default} if heading is None else {"heading": heading}
+        given: dict[str, Any] = {"direction": self.default}
+        if end is not None:
+            given = self._toward(end.point) or given
         names = together.patches.transfer_tree(
             self.source, self.root.surface, self.root.point, descendants=self.tool.tree,
             mirrored=self.tool.is_mirrored(self.desk, self.source, self.root.surface, pointer), **given,
         )  # fmt: skip
         self.copy = names[self.source]
         self.desk.preview(f"Transfer {self.source}", self._paired(together, names))
+
+    def _toward(self, end: SurfacePoints) -> dict[str, Any]:
+        """The heading at the root toward another point, as verbs take it; nothing where the two are one place."""
+        shown, surface = self.desk.shown, self.root.surface
+        try:
+            ends = [shown.on_carrier(surface, point) for point in (self.root.point, end)]
+            heading = heading_to(shown.carrier(surface), *ends)
+        except NotManifold:  # it gets a proxy when the copy is made
+            mesh = shown.mesh(surface)
+            return {"direction": end.positions(mesh)[0] - self.root.point.positions(mesh)[0]}
+        return {} if heading is None else as_seen(shown, surface, Root.at(ends[0], heading))[1]
 
     def _paired(self, together: Together, names: dict[str, str]) -> Together:
         if self.tool.pair and self.desk.document.patch(self.source).surface != self.root.surface:
@@ -111,14 +123,16 @@ def _along(desk: Desk, source: str, hit: Hit) -> FloatArray:
     """(3,) the direction of the source's axis as it is seen, in the space of the surface that was hit."""
     here = desk.scene.surfaces[desk.document.patch(source).surface]
     root = desk.shown.root(source)
-    direction = heading_to_direction(here.mesh, root.point(), np.array([root.heading]))[0]
+    surface = desk.document.patch(source).surface
+    carrier = desk.shown.posed_carrier(surface, here.mesh)
+    direction = heading_to_direction(carrier, root.point(), np.array([root.heading]))[0]
     there = desk.scene.surfaces[hit.surface]
     return there.surface[:3, :3] @ here.world[:3, :3] @ direction
 
 
 def ghost_of(desk: Desk, tool: Transfer, source: str, hit: Hit, direction: FloatArray, pointer: Pointer) -> Overlay:
     """The copies before they are made."""
-    draft = Draft(desk.document, desk.session.derived, desk.session.rigs)
+    draft = Draft(desk.document, desk.session.derived, desk.session.rigs, makers=desk.session.makers)
     mirrored = tool.is_mirrored(desk, source, hit.surface, pointer)
     names = draft.patches.transfer_tree(
         source, hit.surface, hit.point, direction=direction, mirrored=mirrored, descendants=tool.tree

@@ -206,6 +206,7 @@ READING = {
         "carrier",
         "carrier_of",
         "on_carrier",
+        "posed_carrier",
         "seen",
         "axis_points",
     ]
