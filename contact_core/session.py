@@ -178,14 +178,15 @@ class Session(GraspingSession):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what opening the file or the scene found, and on surfaces whose contacts run on proxies."""
+        """Sentences on what opening the file or the scene found, and on surfaces that got proxies since."""
         own = self._file.notes if self._file is not None else ()
         missing = tuple(self._binding.missing.values()) if self._binding is not None else ()
+        before = {surface.carrier_digest for surface in self.history.base.surfaces.values()}
         proxied = tuple(
-            f"the contacts of {surface.name!r} run on a proxy, a closed surface near its mesh"
+            f"the contacts of {surface.name!r} run on a proxy now, a closed surface near its mesh"
             f" ({surface.proxy.maker or 'brought by hand'})."
             for surface in self.document.surfaces.values()
-            if surface.proxy is not None
+            if surface.proxy is not None and surface.carrier_digest not in before
         )
         return self._opening_notes + own + missing + proxied
 

@@ -63,7 +63,7 @@ class StrokeField:
         return replace(self, distances=distances, changed=frozen(near[lower], np.int64, (None,), "changed"))
 
     def _distances(self, points: SurfacePoints, targets: SurfacePoints) -> FloatArray:
-        """(k,) from points to targets over the surface; straight ones where it is broken, which a preview may show."""
+        """(k,) from points to targets over the surface; straight ones where it is broken."""
         try:
             return log_map(self.mesh, points, targets, max_distance=self.reach).distance
         except NotManifold:
