@@ -7,7 +7,6 @@ A front end gives `handle` its events and calls `frame` before it draws. Everyth
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -156,9 +155,9 @@ class Application:
 
     def _own(self, action: str) -> None:
         own: dict[str, Callable[[], object]] = {
-            "show.help": lambda: setattr(self, "help_wanted", not self.help_wanted),
-            "file.open": lambda: setattr(self, "wants", "open"),
-            "file.export": lambda: setattr(self, "wants", "export"),
+            "show.help": self._turn_page,
+            "file.open": lambda: self._ask("open"),
+            "file.export": lambda: self._ask("export"),
             "file.save": self.save,
             "pose.key": self.key_pose,
             "pose.next": lambda: self.step_key(+1),
@@ -176,6 +175,12 @@ class Application:
         """What was refused last, "" where nothing was."""
         return self.interaction.status.refusal or self._recovery.failure
 
+    def _turn_page(self) -> None:
+        self.help_wanted, self._told = not self.help_wanted, True
+
+    def _ask(self, what: str) -> None:
+        self.wants, self._told = what, True
+
     def attempt(self, act: Callable[[], object]) -> None:
         """Do something; what is refused stands in `line`."""
         try:
@@ -189,7 +194,8 @@ class Application:
     @property
     def title(self) -> str:
         """What is open, for the title of a window."""
-        name = self._path.name if self._path is not None else "untitled"
+        path = getattr(self.session.host, "path", None) or self._path
+        name = path.name if path is not None else "untitled"
         return f"{name}{'' if self.session.history.is_clean else ' •'}"
 
     def save(self, path: Path | str | None = None) -> None:
@@ -352,8 +358,10 @@ class Application:
 
     def line(self) -> str:
         """The line of status: what the tool does, and what was done last."""
-        status = replace(self.interaction.status, refusal="", work=None)
-        return " · ".join([status.line(), *self.notes])
+        status = self.interaction.status
+        where = f"on {status.surface}" if status.surface else ""
+        solved = "" if status.solve_ms is None else f"solve {status.solve_ms:.0f} ms"
+        return " · ".join(part for part in (status.hint, where, status.proposed, solved, *self.notes) if part)
 
     def tree(self) -> list[dict[str, Any]]:
         """The rows of the tree."""

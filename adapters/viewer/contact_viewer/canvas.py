@@ -7,6 +7,7 @@ are two lights, and edges are smoothed only in the frame that stands still.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -33,6 +34,8 @@ from contact_viewer.look import DARK, Theme, darker
 
 GHOST = 0.32  # opacity of a surface that one looks through
 _LIGHTS = (((-0.45, 0.7, 0.9), 0.82), ((0.6, -0.2, 0.8), 0.40))
+_FRAME = 0.035  # seconds that a frame may take while things move
+_DETAILS = (1.0, 0.85, 0.7, 0.55)  # of width and height, that are drawn then
 _SAMPLES = 8  # for a pixel of a frame that stands still
 _HIDDEN = 0.35  # opacity of a line where something lies before it
 _SEAM: Color = (0.05, 0.05, 0.06)  # round lines, so that they show on what is light as well
@@ -55,9 +58,12 @@ class Line:
 
 
 class Canvas:
-    """Draws in a vtkRenderWindow. `eye` is its camera."""
+    """Draws in a vtkRenderWindow. `eye` is its camera.
 
-    def __init__(self, window: Any, *, up: str = "Y", theme: Theme = DARK) -> None:
+    sized: whether `resize` says how large the window is; one on the screen is as large as its user makes it.
+    """
+
+    def __init__(self, window: Any, *, up: str = "Y", theme: Theme = DARK, sized: bool = True) -> None:
         from vtkmodules.vtkRenderingCore import vtkRenderer
 
         self.window = window
@@ -72,6 +78,7 @@ class Canvas:
         self._base.SetGradientBackground(True)
         _light(self._base)
         self.eye = Eye(self._base, up=up)
+        self.eye.viewport = tuple(window.GetSize())
         self._surfaces: dict[str, SurfaceActor] = {}
         self._fills: dict[str, FillActor] = {}
         self._lines = LineActors(self._base, in_front=True)  # where nothing lies before them
@@ -80,6 +87,10 @@ class Canvas:
         self._words = WordActors(self._above)
         self._texts = CornerTexts(self._above)
         self._software: bool | None = None
+        self._overlay = Overlay()
+        self._sized = sized
+        self._detail = 1.0 if not sized else 0.0
+        self._seconds: float | None = None  # of a frame with all of its pixels
         self._stroke_table: tuple[Any, Any] | None = None
         self.theme = theme
         self.set_theme(theme)
@@ -111,23 +122,23 @@ class Canvas:
 
     def show(self, overlay: Overlay) -> None:
         """Draw an overlay in place of the one before; arrays that are the very same cost nothing."""
+        self._overlay, ratio = overlay, self.eye.pixel_ratio * (self._detail or 1.0)
         fills: dict[str, Decal | Ghost] = {decal.patch: decal for decal in overlay.decals if len(decal.triangles)}
-        fills |= {f"ghost {k}": ghost for k, ghost in enumerate(overlay.ghosts)}
+        fills |= {f"ghost {k}": ghost for k, ghost in enumerate(overlay.ghosts) if len(ghost.triangles)}
         for name in set(self._fills) - set(fills):
             self._fills.pop(name).remove()
         for name, fill in fills.items():
             if name not in self._fills:
                 self._fills[name] = FillActor(self._base)
-            self._fills[name].show(fill, self.eye.pixel_ratio)
+            self._fills[name].show(fill, ratio)
         self._tint(overlay.tint)
         lines = [line for axis in overlay.axes for line in self._axis(axis)]
         seams = [Line(line.points, _SEAM, line.width + 2.0, 0.7) for line in lines]
         pairs = [line for pair in overlay.pair_lines for line in _pair(pair)]
         rings = [_ring(ring) for ring in overlay.rings]
-        ratio = self.eye.pixel_ratio
         self._lines.show([*seams, *lines, *rings], ratio)
         self._hidden.show([*(line.faded(_HIDDEN) for line in lines), *pairs, *rings], ratio)
-        loose = [decal for decal in overlay.decals if not len(decal.triangles)]
+        loose = [each for each in (*overlay.decals, *overlay.ghosts) if not len(each.triangles)]
         self._dots.show(overlay.handles, loose, ratio)
         self._words.show(overlay.labels, ratio)
 
@@ -177,41 +188,64 @@ class Canvas:
 
     # -- drawing -------------------------------------------------------------------------------------------------
 
-    @property
-    def software(self) -> bool:
-        """Whether the processor draws; known after the first frame."""
-        if self._software is None:
-            self.window.Render()
-            self._software = is_software(self.window)
-        return self._software
-
-    def render(self, *, still: bool = False) -> None:
-        """Draw one frame. still: nothing is on the move, so edges may be smoothed at leisure."""
-        samples = _SAMPLES if still or self._software is False else 0
-        if self.window.GetMultiSamples() != samples:
-            self.window.SetMultiSamples(samples)
+    def render(self, *, still: bool = False, quick: bool = False) -> None:
+        """Draw one frame. still: with smooth edges, at leisure. quick: things move, so that where the processor
+        draws, and slowly, fewer pixels have to do."""
         self.eye.clip()
-        self._words.place(self.eye)
+        self._sharpen(smooth=still or self._software is False)
+        self._set_detail(self._quick_detail() if quick else 1.0)
+        self._words.place(self.eye, self._detail)
+        start = time.perf_counter()
         self.window.Render()
+        if self._software is None:  # a window knows once it has drawn
+            self._software = is_software(self.window)
+        elif quick and self._software:
+            whole = (time.perf_counter() - start) / self._detail**2
+            self._seconds = whole if self._seconds is None else 0.7 * self._seconds + 0.3 * whole
 
     def image(self, *, still: bool = False) -> Any:
         """(h, w, 3) uint8 of a new frame, from its top row downwards."""
         return self.rgba(still=still)[..., :3]
 
-    def rgba(self, *, still: bool = False) -> Any:
-        """(h, w, 4) uint8 of a new frame; its last channel says nothing."""
+    def rgba(self, *, still: bool = False, quick: bool = False) -> Any:
+        """(h, w, 4) uint8 of a new frame, as `render` draws it; its last channel says nothing."""
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
-        self.render(still=still)
-        width, height = self.eye.viewport
+        self.render(still=still, quick=quick)
+        width, height = self.window.GetSize()
         pixels = vtkUnsignedCharArray()
         self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, pixels)
         return np.ascontiguousarray(vtk_to_numpy(pixels).reshape(height, width, 4)[::-1])
 
     def resize(self, width: int, height: int) -> None:
-        """Draw so many pixels from now on."""
-        self.window.SetSize(max(10, width), max(10, height))
+        """Another size of the view, pixels."""
+        self.eye.viewport = (max(10, width), max(10, height))
+        self._detail = 0.0  # unlike any: the next frame sets the size of the window
+        self._seconds = None
+
+    def _sharpen(self, *, smooth: bool) -> None:
+        """Smooth edges: by samples where a graphics card draws, by a filter (FXAA) where the processor does."""
+        self._base.SetUseFXAA(smooth and self._software is not False)
+        samples = _SAMPLES if smooth and self._software is False else 0
+        if self.window.GetMultiSamples() != samples:
+            self.window.SetMultiSamples(samples)
+
+    def _quick_detail(self) -> float:
+        """How much of width and height is drawn, so that a frame takes about as long as one may."""
+        if self._seconds is None or not self._software:
+            return 1.0
+        wanted = (_FRAME / max(self._seconds, 1e-6)) ** 0.5
+        return next((step for step in _DETAILS if step <= wanted), _DETAILS[-1])
+
+    def _set_detail(self, detail: float) -> None:
+        """Draw so much of width and height; sizes in pixels follow."""
+        if detail == self._detail or not self._sized:
+            return
+        self._detail = detail
+        width, height = self.eye.viewport
+        self.window.SetSize(max(8, round(width * detail)), max(8, round(height * detail)))
+        self.show(self._overlay)
 
     def close(self) -> None:
         """Let go of what the graphics driver holds."""
@@ -367,15 +401,15 @@ class DotActors:
         self._renderer = renderer
         self._of_radius: dict[float, tuple[Polygons, Any]] = {}
 
-    def show(self, handles: Sequence[Handle], loose: Sequence[Decal], ratio: float) -> None:
+    def show(self, handles: Sequence[Handle], loose: Sequence[Decal | Ghost], ratio: float) -> None:
         """Draw these handles, each on a darker disk so that it shows on its own colour, and patches whose points
         span no triangle."""
         groups: dict[float, list[tuple[FloatArray, Color]]] = {}
         for handle in handles:
             groups.setdefault(handle.radius - 0.5, []).append((handle.position, darker(handle.color, 0.25)))
             groups.setdefault(handle.radius - 2.0, []).append((handle.position, handle.color))
-        for decal in loose:
-            groups.setdefault(3.0, []).extend((point, decal.color) for point in decal.points)
+        for each in loose:
+            groups.setdefault(3.0, []).extend((point, each.color) for point in each.points)
         for radius in set(self._of_radius) - set(groups):
             self._renderer.RemoveActor(self._of_radius.pop(radius)[1])
         for radius in sorted(groups, reverse=True):
@@ -417,8 +451,8 @@ class WordActors:
                 look.SetBackgroundOpacity(0.62)
                 look.SetVerticalJustificationToCentered()
 
-    def place(self, eye: Eye) -> None:
-        """Put them where their points are now."""
+    def place(self, eye: Eye, detail: float) -> None:
+        """Put them where their points are now. detail: pixels that are drawn for one of the view."""
         if not self._words:
             return
         height = eye.viewport[1]
@@ -426,7 +460,7 @@ class WordActors:
             self._actors, eye.project([word.position for word in self._words]), strict=False
         ):
             actor.SetVisibility(bool(depth > 0))
-            actor.SetPosition(float(x) + 9 * eye.pixel_ratio, height - float(y))
+            actor.SetPosition(detail * (float(x) + 9 * eye.pixel_ratio), detail * (height - float(y)))
 
 
 class CornerTexts:
@@ -508,7 +542,7 @@ def _matrix(values: FloatArray) -> Any:
 def _normals(points: FloatArray, triangles: IntArray) -> FloatArray:
     """(n, 3) of points by the areas of their triangles."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)  # (t, 3)
+    cross = np.cross(b - a, c - a).astype(float)  # (t, 3)
     normals = np.stack(
         [sum(np.bincount(triangles[:, k], cross[:, axis], len(points)) for k in range(3)) for axis in range(3)], 1
     )

@@ -67,10 +67,15 @@ class Drawer:
             rigged = surface is not None and surface.rig is not None
             color = theme.skin if rigged else theme.things[things % len(theme.things)]
             things += not rigged
-            opacity = 0.0 if name in self.hidden_surfaces else self._interaction.opacity(name)
-            if 0.0 < opacity < 1.0:
-                opacity = GHOST
+            opacity = 0.0 if name in self.hidden_surfaces else self._opacity(name, rigged=rigged)
             self._canvas.surface(name).set_look(color, opacity=opacity, visible=opacity > 0.0)
+
+    def _opacity(self, name: str, *, rigged: bool) -> float:
+        """As the interaction says; with no surface in hand, X-ray looks through things and not through hands."""
+        settings, opacity = self._interaction.settings, self._interaction.opacity(name)
+        nothing_in_hand = self._interaction.selection.surface is None
+        ghost = 0.0 < opacity < 1.0 or (settings.xray and nothing_in_hand and not rigged)
+        return GHOST if ghost else opacity
 
     def _visible(self, overlay: Overlay) -> Overlay:
         """The overlay without what is hidden."""

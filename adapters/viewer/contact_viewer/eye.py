@@ -21,8 +21,9 @@ _STEEPEST = 89.0  # degrees above the horizon: beyond, left and right change pla
 class Eye:
     """The camera of a vtkRenderer, as a view.
 
-    up: the axis of the scene that stays upright, "X", "Y" or "Z". pixel_ratio: pixels of the image for one of the
-    screen's own units, 2 on most laptops.
+    up: the axis of the scene that stays upright, "X", "Y" or "Z". viewport: width and height of the view, pixels;
+    the image that is drawn may have fewer while things move. pixel_ratio: pixels for one of the screen's own units,
+    2 on most laptops.
     """
 
     def __init__(self, renderer: Any, *, up: str = "Y") -> None:
@@ -30,6 +31,7 @@ class Eye:
         self._camera = renderer.GetActiveCamera()
         self._camera.SetViewAngle(FIELD_OF_VIEW)
         self.pixel_ratio = 1.0
+        self.viewport = (1280, 720)
         self.up = up
 
     @property
@@ -45,12 +47,6 @@ class Eye:
         self.look_from("default")
 
     # -- what a view answers -------------------------------------------------------------------------------------
-
-    @property
-    def viewport(self) -> tuple[int, int]:
-        """Width and height of the image, pixels."""
-        width, height = self._renderer.GetRenderWindow().GetSize()
-        return int(width), int(height)
 
     @property
     def eye(self) -> FloatArray:

@@ -22,6 +22,7 @@ TILTED, TURNED = 25.0, 50.0  # degrees, likewise
 _SLOTS: Mapping[str, Slot[Any]] = {
     slot.hook: slot for slot in (TOOLS, BRUSHES, AXIS_GENERATORS, PLACERS, POSE_SOLVERS, POSE_TERMS)
 }
+_ELSEWHERE = ("live", "xray", "isolate")  # have buttons of their own
 _NAMED = {"brush": BRUSHES, "generator": AXIS_GENERATORS, "solver": POSE_SOLVERS, "placer": PLACERS}
 
 
@@ -153,7 +154,11 @@ def settings(interaction: Interaction) -> list[dict[str, Any]]:
             "title": "Live and solving",
             "slot": "",
             "name": "interaction",
-            "items": [_item(each, each.default, plugins) for each in settings_of(interaction.settings)],
+            "items": [
+                _item(each, each.default, plugins)
+                for each in settings_of(interaction.settings)
+                if each.name not in _ELSEWHERE
+            ],
         }
     )
     return [group for group in groups if group["items"]]

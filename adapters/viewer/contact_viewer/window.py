@@ -28,13 +28,12 @@ class Front:
         self.app = app
         self.events = VtkEvents(interactor, app.handle)
         self._interactor = interactor
-        self._size = app.canvas.eye.viewport
         self._quiet = 0
 
     def tick(self) -> bool:
         """One turn of the loop: handle what is due and draw; whether something was drawn."""
-        app, resized = self.app, self.app.canvas.eye.viewport != self._size
-        self._size = app.canvas.eye.viewport
+        app, size = self.app, tuple(self._interactor.GetRenderWindow().GetSize())
+        resized, app.canvas.eye.viewport = size != app.canvas.eye.viewport, size
         self._ask()
         parts = app.frame()
         if parts or resized:
@@ -108,7 +107,7 @@ def run_window(sources: Sequence[str], plugins: PluginManager) -> None:
     window = screen_window(_SIZE, "contact")
     interactor = vtkRenderWindowInteractor()
     interactor.SetRenderWindow(window)
-    app = Application(Canvas(window), sources, plugins)
+    app = Application(Canvas(window, sized=False), sources, plugins)
     try:
         Front(app, interactor).run()
     finally:

@@ -85,6 +85,8 @@ def _top(v3: Any, html: Any) -> None:
                     f"{{{{ {name} }}}}", classes="ml-1 text-truncate d-none d-lg-inline-block",
                     style="max-width: 150px; font-weight: 400;",
                 )  # fmt: skip
+        html.Span("open in {{ pages }} pages, one document", v_if=("pages > 1",), classes="text-caption ml-3",
+                  style="opacity: .7;")  # fmt: skip
         v3.VSpacer()
         with html.Div(v_if=("work",), classes="d-flex align-center mr-2", style="gap: 8px; min-width: 190px;"):
             html.Span(
@@ -224,7 +226,8 @@ def _field(html: Any) -> None:
             with html.Select(v_else_if="item.kind === 'choice'", value=("item.value",),
                              change=tell.format("$event.target.value")):  # fmt: skip
                 html.Option("decide for me", v_if="item.optional", value="")
-                html.Option("{{ choice }}", v_for="choice in item.choices", key=("choice",), value=("choice",))
+                html.Option("{{ choice }}", v_for="choice in item.choices", key=("choice",), value=("choice",),
+                            selected=("choice === item.value",))  # fmt: skip
             html.Input(v_else=True, type=("['number', 'count'].includes(item.kind) ? 'number' : 'text'",),
                        value=("item.value",), min=("item.low",), max=("item.high",), step="any",
                        placeholder=("item.optional ? 'decide for me' : ''",),

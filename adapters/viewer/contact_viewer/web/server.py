@@ -35,12 +35,14 @@ class WebApplication:
         self._ready = ready
         self._uploads = tempfile.TemporaryDirectory(prefix="contact-uploads-")
         self._told_at = 0.0
+        self._pages = 0
         self._pending: set[str] = set()
         self._server = _new_server(self.guard)
         self.stream: Stream | None = None
         self._server.controller.on_server_bind.add(self._bind)
         self._server.controller.on_server_ready.add(self._start)
         self._server.controller.on_client_connected.add(self._greet)
+        self._server.controller.on_client_exited.add(self._leave)
         self._listen()
         self._initial()
         build(self._server, "contact_view")
@@ -74,9 +76,15 @@ class WebApplication:
 
     def _greet(self, *_: Any, **__: Any) -> None:
         """A page was opened, or opened again: it wants everything."""
+        self._pages += 1
         self._tell(everything=True)
         if self.stream is not None:
             self.stream.wake(redraw=True)
+
+    def _leave(self, *_: Any, **__: Any) -> None:
+        """A page was closed."""
+        self._pages = max(0, self._pages - 1)
+        self._tell()
 
     async def _upload(self, request: Any) -> Any:
         from aiohttp import web
@@ -221,6 +229,7 @@ class WebApplication:
         status = app.interaction.status
         told: dict[str, Any] = {
             "title": app.title,
+            "pages": self._pages,
             "line": app.line(),
             "refusal": app.refusal(),
             "work": None if status.work is None else

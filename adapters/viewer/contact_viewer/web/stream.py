@@ -21,7 +21,7 @@ from contact_viewer.web.browser_events import pointer_of
 
 log = logging.getLogger(__name__)
 _QUICK, _SHARP = 72, 93  # qualities of JPEG
-_REST = 0.18  # seconds without a change, after which a frame stands still
+_REST = 0.25  # seconds without a change, after which a frame stands still
 _POLL = 0.08  # seconds between looks at work that runs beside the window
 _MOST_PIXELS = 2560 * 1600  # of an image: a screen of 4K is drawn a little smaller
 _MOST_WAITING = 400  # events; what comes beyond is dropped, moves first
@@ -153,7 +153,7 @@ class Stream:
     async def _send(self, *, still: bool) -> None:
         if self._streamer is None:
             return
-        pixels = self._app.canvas.rgba(still=still)
+        pixels = self._app.canvas.rgba(still=still, quick=not still)
         quality = _SHARP if still else _QUICK
         loop = asyncio.get_running_loop()
         content = await loop.run_in_executor(None, encoded, pixels, quality)
