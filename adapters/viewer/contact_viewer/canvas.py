@@ -138,7 +138,8 @@ class Canvas:
         rings = [_ring(ring) for ring in overlay.rings]
         self._lines.show([*seams, *lines, *rings], ratio)
         self._hidden.show([*(line.faded(_HIDDEN) for line in lines), *pairs, *rings], ratio)
-        loose = [each for each in (*overlay.decals, *overlay.ghosts) if not len(each.triangles)]
+        loose: list[Decal | Ghost] = [decal for decal in overlay.decals if not len(decal.triangles)]
+        loose += [ghost for ghost in overlay.ghosts if not len(ghost.triangles)]
         self._dots.show(overlay.handles, loose, ratio)
         self._words.show(overlay.labels, ratio)
 

@@ -221,7 +221,7 @@ def test_files_that_cannot_be_opened_leave_everything_as_it_is(hand: Hand, tmp_p
     session = hand.app.session
     (tmp_path / "bad.glb").write_bytes(b"not a model")
     for sources in ([str(tmp_path / "bad.glb")], [str(tmp_path / "none.obj")], ["sample:nobody"]):
-        hand.app.attempt(lambda sources=sources: hand.app.open(sources))  # type: ignore[misc]
+        hand.app.attempt(lambda sources=sources: hand.app.open(sources))
         assert hand.app.session is session and hand.app.line()
 
 
@@ -260,7 +260,7 @@ def test_settings_come_from_a_panel_checked(hand: Hand) -> None:
         ("no_slot", "paint", "radius", "1"),
         ("", "interaction", "iterations", "0"),
     ):
-        hand.app.attempt(lambda a=(slot, name, item, value): panel.set_setting(interaction, *a))  # type: ignore[misc]
+        hand.app.attempt(lambda a=(slot, name, item, value): panel.set_setting(interaction, *a))
         assert item in hand.app.line() or "no_slot" in hand.app.line()
 
 

@@ -17,6 +17,7 @@ from urllib.parse import urlsplit
 
 LOCAL = ("127.0.0.1", "localhost")
 HOST = LOCAL[0]  # what the server binds
+_PAGES = ("/", "/index.html")
 _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -67,6 +68,8 @@ class Guard:
             refusal = self.refusal(request.headers, request.query)
             if refusal is not None:
                 return web.Response(status=403, text=refusal + "\n", headers=_HEADERS)
+            if request.path in _PAGES and "secret" not in request.query:  # a page that is loaded again has lost it
+                raise web.HTTPFound(f"/index.html?secret={self.key}")
             response = await handler(request)
             if not response.prepared:  # a web socket is
                 response.headers.update(_HEADERS)
