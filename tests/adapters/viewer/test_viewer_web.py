@@ -395,7 +395,7 @@ def test_keys_in_a_field_of_text_are_text(browser: Any, served: Served) -> None:
     page = Page.opened(browser, served.address)
     before = page.state("tools")
     page.page.locator("button[title='Open (Ctrl+O)']").click()
-    field = page.page.locator("input[type=text]").first
+    field = page.page.locator(".v-dialog input[type=text]").first
     field.click()
     page.page.keyboard.type("bgt none.glb")
     page.page.wait_for_timeout(200)

@@ -36,6 +36,7 @@ class WebApplication:
         self._uploads = tempfile.TemporaryDirectory(prefix="contact-uploads-")
         self._told_at = 0.0
         self._pages = 0
+        self._help_told = False
         self._pending: set[str] = set()
         self._server = _new_server(self.guard)
         self.stream: Stream | None = None
@@ -175,9 +176,7 @@ class WebApplication:
         told("write")(lambda path: app.write(_path(path)))
         told("uploaded")(lambda text, fine: app.say(str(text)))
         self._server.state.change("theme")(self._theme)
-        self._server.state.change("help_wanted")(
-            lambda help_wanted, **_: setattr(app, "help_wanted", bool(help_wanted))
-        )
+        self._server.state.change("help_wanted")(self._help_turned)
 
     def _act(self, action: str) -> None:
         state = self._server.state
@@ -196,6 +195,9 @@ class WebApplication:
             self.app.add(sources)
         else:
             self.app.open(sources)
+
+    def _help_turned(self, help_wanted: bool, **_: Any) -> None:
+        self.app.help_wanted = self._help_told = bool(help_wanted)
 
     def _theme(self, theme: str, **_: Any) -> None:
         if theme in THEMES:
@@ -237,8 +239,9 @@ class WebApplication:
             "proposed": status.proposed,
             "undo_name": app.undo_name(),
             "redo_name": app.redo_name(),
-            "help_wanted": app.help_wanted,
         }  # fmt: skip
+        if app.help_wanted != self._help_told:  # else a dialog that is just being closed would open again
+            told["help_wanted"] = self._help_told = app.help_wanted
         if app.wants is not None:
             told[f"{app.wants}_wanted"], app.wants = True, None
         if everything or pending & {"document", "selection", "surfaces", "visibility", "status"}:
