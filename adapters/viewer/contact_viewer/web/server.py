@@ -78,6 +78,9 @@ class WebApplication:
     def _greet(self, *_: Any, **__: Any) -> None:
         """A page was opened, or opened again: it wants everything."""
         self._pages += 1
+        self.app.help_wanted = self._help_told = False
+        with self._server.state as state:
+            state.update({"open_wanted": False, "export_wanted": False, "help_wanted": False})
         self._tell(everything=True)
         if self.stream is not None:
             self.stream.wake(redraw=True)
