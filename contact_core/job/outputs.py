@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ from contact_core.plugins.registry import FORMATS, RENDERERS
 from contact_core.rig.pose_files import save_pose
 from contact_core.rig.poses import moved_roots
 from contact_core.rig.rig import Pose
+from contact_core.scene.host import SceneSpace, StoredDocument
+from contact_core.scene.memory_host import MemoryHost
+from contact_core.scene.memory_scene import MemoryScene, save_scene
 from contact_core.scene.picture import Picture
 
 
@@ -35,6 +39,7 @@ def files_of(recipe: Recipe) -> dict[str, str]:
         "document": "document.json",
         **(poses if len(names) > 1 else {"pose": "pose.json"}),
         "model": "posed.glb",
+        "scene": "scene.contactscene",
         "picture": "picture.png",
         "report": "report.json",
     }
@@ -52,6 +57,7 @@ def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
                 pose = job.session.document.poses[spec.name]
                 save_pose(stage / name, pose, rig=job.session.rigs[spec.name].name)
             _write_model(job, stage / files["model"], plugins)
+            save_scene(scene_of(job), stage / files["scene"])
         with job.stage("render", 0.8, "Drawing the pictures"):
             renderer = draw(job, pictures_of(job, rows), stage / files["picture"], plugins)
         report = report_of(job, renderer)
@@ -89,6 +95,17 @@ def _write_model(job: Job, path: Path, plugins: PluginManager) -> None:
         if asset.rig is not None:
             poses[asset.name] = moved_roots(asset.rig, document.poses[name], world)
     writers[0].write(path, list(job.assets.values()), poses)
+
+
+def scene_of(job: Job) -> MemoryScene:
+    """Meshes, rigs, poses and contacts together, as a host opens them: what is edited on."""
+    document, first = job.session.document, job.assets[job.recipe.manipulators[0].name]
+    host = MemoryHost(space=SceneSpace(first.meters_per_unit or 1.0, first.up_axis))
+    for name, asset in job.assets.items():
+        key = host.add(replace(asset, name=name), document.surface(name).world_from_surface)
+        if asset.rig is not None:
+            host.write_pose(key, document.poses[name])
+    return replace(host.scene, document=StoredDocument.of(job.session.timed_document, 0))
 
 
 def report_of(job: Job, renderer: str | None) -> dict[str, Any]:

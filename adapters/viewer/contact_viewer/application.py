@@ -48,7 +48,6 @@ class Application:
         self.notes: list[str] = []
         self.help_wanted = False
         self.wants: str | None = None  # "open" or "export": a file that the artist is to name
-        self.timeline = 0.0  # frame at which poses are keyed
         self._state_folder = state_folder
         self._path: Path | None = None
         self._session: Session | None = None
@@ -293,47 +292,37 @@ class Application:
         except ValueError as error:
             raise InvalidInput(str(error)) from None
 
-    # -- pose keys -----------------------------------------------------------------------------------------------
+    # -- time ----------------------------------------------------------------------------------------------------
 
     @property
     def keys(self) -> tuple[float, ...]:
         """Frames with a pose key of any hand."""
-        host, found = self.session.host, set()
-        for name, bound in self.session.binding.surfaces.items():
-            if name in self.session.rigs and hasattr(host, "pose_keys"):
-                found.update(host.pose_keys(bound.object_id))
-        return tuple(sorted(found))
+        film = self.session.timeline
+        tracks = (film.track("pose", name) for name in self.session.rigs)
+        return tuple(sorted({frame for track in tracks if track is not None for frame in track.frames}))
 
-    def key_pose(self, frame: float | None = None) -> None:
-        """Key the pose of every hand at a frame, the current one by default. Raises FileRefused."""
-        at = self.timeline if frame is None else float(frame)
-        poses = dict(self.session.document.poses)
-        if self.session.host is None or not poses:
+    def key_pose(self) -> None:
+        """Key the pose of every hand at the frame that is shown, as one step. Raises InvalidInput."""
+        posed = [name for name in self.session.document.poses if name in self.session.rigs]
+        if not posed:
             raise InvalidInput("there is no pose to key yet: solve first.")
-        with self.session.host.step(f"Key frame {at:g}"):
-            self.session.binding.write(poses, at)
-        self.timeline = at
+        at = self.session.timeline.frame
+        with self.session.macro(f"Key the pose at frame {at:g}"):
+            for name in posed:
+                self.session.timeline.key("pose", name)
         self.say(f"keyed the pose at frame {at:g}.")
 
     def step_key(self, by: int) -> None:
         """Go to the next pose key, or the one before. Raises InvalidInput."""
-        keys = self.keys
-        beyond = [frame for frame in keys if (frame > self.timeline if by > 0 else frame < self.timeline)]
+        at = self.session.timeline.frame
+        beyond = [frame for frame in self.keys if (frame > at if by > 0 else frame < at)]
         if not beyond:
-            raise InvalidInput(f"there is no pose key {'after' if by > 0 else 'before'} frame {self.timeline:g}.")
+            raise InvalidInput(f"there is no pose key {'after' if by > 0 else 'before'} frame {at:g}.")
         self.go_to(beyond[0] if by > 0 else beyond[-1])
 
     def go_to(self, frame: float) -> None:
-        """Pose every hand as it is at a frame, as one step."""
-        self.timeline = float(frame)
-        if not self.keys:
-            return
-        there = self.session.binding.read(self.session.document, self.timeline)
-        moved = {n: p for n, p in there.poses.items() if self.session.document.poses.get(n) is not p}
-        if moved:
-            with self.session.macro(f"Go to frame {frame:g}"):
-                for name, pose in moved.items():
-                    self.session.surfaces.set_pose(name, pose)
+        """Show another frame. Raises InvalidInput."""
+        self.session.timeline.go(frame)
 
     # -- frames --------------------------------------------------------------------------------------------------
 

@@ -64,14 +64,14 @@ class Recovery:
         self.path.unlink(missing_ok=True)
 
     def _keep(self, session: Session, change: DocumentChanged) -> None:
-        if change.kind == "preview":
+        if change.kind in ("preview", "frame"):
             return
         try:
             if session.history.is_clean:
                 self.forget()
                 return
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomic(self.path, dump_document(change.after))
+            write_atomic(self.path, dump_document(session.timed_document))
         except (OSError, ContactError) as error:  # a full disk: the edit stands all the same
             self.failure = f"this step is not kept against a crash ({error}): save it."
             log.warning("%s", self.failure)

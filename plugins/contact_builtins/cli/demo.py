@@ -20,6 +20,7 @@ class Demo:
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_builtins.demos import DEFAULT, demo_names, demo_recipe, run_demo
         from contact_core.cli.pose import tell
+        from contact_core.plugins.registry import CLI
 
         if arguments.list:
             titles = {name: demo_recipe(name).title for name in demo_names()}
@@ -29,4 +30,6 @@ class Demo:
         out = arguments.out or Path("contact-demo") / name
         result = run_demo(name, out, plugins=arguments.plugins, progress=arguments.output)
         tell(result, arguments.output)
+        if "view" in arguments.plugins.offers(CLI):
+            arguments.output.remark(f"Open it with: contact view {result.files['scene']}")
         return 0

@@ -128,7 +128,7 @@ def test_a_job_writes_its_files_and_they_can_be_read_again(tmp_path: Path) -> No
     told: list[tuple[float, str]] = []
     progress = CallbackProgress(lambda fraction, text: told.append((fraction or 0.0, text)))
     result = run(demo_recipe("alien"), tmp_path / "out", plugins=manager, progress=progress)
-    names = {"document.json", "pose.json", "posed.glb", "picture.png", "report.json"}
+    names = {"document.json", "pose.json", "posed.glb", "scene.contactscene", "picture.png", "report.json"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == names == {p.name for p in result.files.values()}
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert report == json.loads(json.dumps(dict(result.report)))
@@ -170,7 +170,7 @@ def test_the_same_recipe_gives_the_same_bytes(tmp_path: Path) -> None:
     manager = with_renderers(Sketch())
     for place in ("one", "two"):
         run(demo_recipe("alien"), tmp_path / place, plugins=manager)
-    for name in ("document.json", "pose.json", "posed.glb"):
+    for name in ("document.json", "pose.json", "posed.glb", "scene.contactscene"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
@@ -321,8 +321,14 @@ def test_a_picture_of_an_earlier_run_does_not_stay_beside_a_report_without_one(t
     (tmp_path / "notes.txt").write_text("mine")
     nothing_draws_or_exports = PluginManager([Plugin(Broken())], discover=False)
     result = write_outputs(demo("alien"), tmp_path, nothing_draws_or_exports)
-    assert set(result.files) == {"document", "pose", "report"}
-    assert {path.name for path in tmp_path.iterdir()} == {"document.json", "pose.json", "report.json", "notes.txt"}
+    assert set(result.files) == {"document", "pose", "scene", "report"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "document.json",
+        "pose.json",
+        "scene.contactscene",
+        "report.json",
+        "notes.txt",
+    }
 
 
 def test_a_report_is_json_whatever_was_measured(tmp_path: Path) -> None:

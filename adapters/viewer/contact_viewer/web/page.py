@@ -44,7 +44,7 @@ def build(server: Any, stream_name: str) -> None:
         _tools(v3, html)
         _right(v3, html)
         with v3.VMain(style="position: relative; height: 100vh;"):
-            with html.Div(classes="contact-view", style="inset: 44px 320px 0 64px;"):
+            with html.Div(classes="contact-view", style="inset: 44px 320px 38px 64px;"):
                 rca.RemoteControlledArea(
                     name=stream_name, display="image", send_mouse_move=True, event_throttle_ms=8,
                     style="width: 100%; height: 100%;",
@@ -53,7 +53,26 @@ def build(server: Any, stream_name: str) -> None:
                 with html.Div(classes="contact-line"):
                     html.Div("{{ line }}", classes="contact-chip")
                     html.Div("{{ refusal }}", v_if=("refusal",), classes="contact-chip contact-refusal")
+            _strip(v3, html)
         _dialogs(v3, html)
+
+
+def _strip(v3: Any, html: Any) -> None:
+    """The frames at the bottom: keys as marks, and the frame that is shown."""
+    with html.Div(classes="contact-strip"):
+        _button(v3, "mdi-skip-previous", "The key before (Left)", click="trigger('act', ['pose.previous'])")
+        _button(v3, "mdi-key-plus", "Key the pose (A)", click="trigger('act', ['pose.key'])")
+        _button(v3, "mdi-skip-next", "The next key (Right)", click="trigger('act', ['pose.next'])")
+        with html.Div(classes="track"):
+            html.Span(
+                v_for="key in film.keys", key=("key.frame",), classes="mark", style=("'left: ' + key.at + '%'",),
+                title=("'key at frame ' + key.frame",), click="trigger('go_to', [key.frame])",
+            )  # fmt: skip
+            html.Input(
+                type="range", min=("film.first",), max=("film.last",), step="1", value=("film.frame",),
+                input="trigger('go_to', [Number($event.target.value)])", title="Frame",
+            )  # fmt: skip
+        html.Span("{{ film.frame }}", classes="frame")
 
 
 def _button(v3: Any, icon: str, tip: str, **attributes: Any) -> None:
@@ -173,12 +192,6 @@ def _right(v3: Any, html: Any) -> None:
                 with html.Div(v_for="group in settings", key=("group.slot + group.name",)):
                     html.Div("{{ group.title }}", classes="contact-head")
                     _field(html)
-            with html.Div(v_if=("keys_at.length",), style="padding: 4px 12px 10px;"):
-                html.Div("Pose keys", classes="contact-head px-0")
-                with html.Div(classes="d-flex flex-wrap", style="gap: 4px;"):
-                    v3.VBtn("{{ frame }}", v_for="frame in keys_at", key=("frame",), size="x-small",
-                            variant=("frame === timeline ? 'flat' : 'tonal'",), color="primary",
-                            click="trigger('go_to', [frame])")  # fmt: skip
 
 
 def _tree_row(v3: Any, html: Any) -> None:

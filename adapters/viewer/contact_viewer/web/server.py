@@ -251,7 +251,7 @@ class WebApplication:
             told["tree"] = app.tree()
             told["report"] = panel.report(app.meets, app.interaction.desk.document)
             told["next_step"] = panel.next_step(app.session, app.interaction)
-            told["keys_at"], told["timeline"] = list(app.keys), app.timeline
+            told["film"] = self._film()
         if everything or pending & {"tool", "settings", "visibility"}:
             told["tools"] = self._tools()
             told["settings"] = panel.settings(app.interaction)
@@ -263,6 +263,16 @@ class WebApplication:
             for name, value in told.items():
                 if state[name] != value:
                     state[name] = value
+
+    def _film(self) -> dict[str, Any]:
+        """The strip of frames: its range, the frame shown, and where keys are, as shares of the range."""
+        film, keys = self.app.session.timeline, self.app.keys
+        first, last = film.settings.first, film.settings.last
+        length = max(last - first, 1e-9)
+        marks = [
+            {"frame": key, "at": round(100 * (key - first) / length, 3)} for key in keys if first <= key <= last
+        ]
+        return {"first": first, "last": last, "frame": film.frame, "keys": marks}
 
     def _tools(self) -> list[dict[str, Any]]:
         active = f"tool.{self.app.interaction.tool}"
