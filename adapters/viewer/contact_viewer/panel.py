@@ -43,8 +43,8 @@ class Residual:
 
     def words(self) -> str:
         """What is wrong with it, in a sentence."""
-        away = "touches" if self.gap <= NEAR else f"is {spelt_length(self.gap)} away"
-        tilt = "" if self.tilt <= TILTED else f", and tilted by {self.tilt:.0f}°"
+        away = "touches" if self.gap <= NEAR else f"{spelt_length(self.gap)} away"
+        tilt = "" if self.tilt <= TILTED else f", tilted by {self.tilt:.0f}°"
         return f"{away}{tilt}"
 
 

@@ -393,6 +393,10 @@ def test_a_dense_screen_is_drawn_and_picked_densely(browser: Any, served: Served
 @pytest.mark.slow
 def test_keys_in_a_field_of_text_are_text(browser: Any, served: Served) -> None:
     page = Page.opened(browser, served.address)
+    second = Page.opened(browser, served.address)
+    second.until("() => trame.state.get('pages') === 2")  # and both say so
+    second.page.close()
+    page.until("() => trame.state.get('pages') === 1")
     before = page.state("tools")
     page.page.locator("button[title='Open (Ctrl+O)']").click()
     field = page.page.locator(".v-dialog input[type=text]").first

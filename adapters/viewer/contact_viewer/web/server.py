@@ -43,7 +43,6 @@ class WebApplication:
         self._server.controller.on_server_bind.add(self._bind)
         self._server.controller.on_server_ready.add(self._start)
         self._server.controller.on_client_connected.add(self._greet)
-        self._server.controller.on_client_exited.add(self._leave)
         self._listen()
         self._initial()
         build(self._server, "contact_view")
@@ -65,6 +64,7 @@ class WebApplication:
         from aiohttp import web
 
         self.guard.protect(wslink_server.app)
+        wslink_server.app.middlewares.append(web.middleware(self._count))
         wslink_server.app.add_routes(
             [web.post("/upload", self._upload), web.get("/download/{name}", self._download)]
         )
@@ -77,7 +77,6 @@ class WebApplication:
 
     def _greet(self, *_: Any, **__: Any) -> None:
         """A page was opened, or opened again: it wants everything."""
-        self._pages += 1
         self.app.help_wanted = self._help_told = False
         with self._server.state as state:
             state.update({"open_wanted": False, "export_wanted": False, "help_wanted": False})
@@ -85,10 +84,16 @@ class WebApplication:
         if self.stream is not None:
             self.stream.wake(redraw=True)
 
-    def _leave(self, *_: Any, **__: Any) -> None:
-        """A page was closed."""
-        self._pages = max(0, self._pages - 1)
-        self._tell()
+    async def _count(self, request: Any, handler: Any) -> Any:
+        """How many pages are open: each holds one web socket."""
+        if request.path != "/ws":
+            return await handler(request)
+        self._pages += 1
+        try:
+            return await handler(request)
+        finally:
+            self._pages -= 1
+            self._tell()
 
     async def _upload(self, request: Any) -> Any:
         from aiohttp import web
