@@ -64,7 +64,19 @@ class WebApplication:
         from aiohttp import web
 
         self.guard.protect(wslink_server.app)
-        wslink_server.app.middlewares.append(web.middleware(self._count))
+
+        async def count(request: Any, handler: Any) -> Any:
+            """How many pages are open: each holds one web socket."""
+            if request.path != "/ws":
+                return await handler(request)
+            self._pages += 1
+            try:
+                return await handler(request)
+            finally:
+                self._pages -= 1
+                self._tell()
+
+        wslink_server.app.middlewares.append(web.middleware(count))
         wslink_server.app.add_routes(
             [web.post("/upload", self._upload), web.get("/download/{name}", self._download)]
         )
@@ -83,17 +95,6 @@ class WebApplication:
         self._tell(everything=True)
         if self.stream is not None:
             self.stream.wake(redraw=True)
-
-    async def _count(self, request: Any, handler: Any) -> Any:
-        """How many pages are open: each holds one web socket."""
-        if request.path != "/ws":
-            return await handler(request)
-        self._pages += 1
-        try:
-            return await handler(request)
-        finally:
-            self._pages -= 1
-            self._tell()
 
     async def _upload(self, request: Any) -> Any:
         from aiohttp import web
