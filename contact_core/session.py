@@ -437,6 +437,19 @@ class Session(GraspingSession):
         """Call `listener` after every change and preview, in their order; the returned function stops that."""
         return self._listeners.listen(listener)
 
+    def draw(self, path: Path | str, *surfaces: str, size: tuple[int, int] = (1280, 720), **view: Any) -> Path:
+        """Draw surfaces, all by default, with their patches and poses into a PNG; returns its path.
+
+        size: pixels. view: camera_from, up, caption, colors, see_through, as for `scene.document_picture`. Raises
+        InvalidInput where no renderer can, and FileRefused.
+        """
+        from contact_core.plugins.drawing import draw
+        from contact_core.scene.document_picture import document_picture
+
+        picture = document_picture(self.geometry, surfaces, **view)
+        draw([picture], Path(path), self.plugins, size=size)
+        return Path(path)
+
     def show_ghost(self, ghost: Ghost | None) -> None:
         """Tell listeners of a preview of what is proposed; None: back to the document."""
         self._preview(self.document, self.document if ghost is None else ghost.ghost)

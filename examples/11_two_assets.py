@@ -18,5 +18,6 @@ with contact.new(hand="sample:human_hand", ball="sample:baseball") as session:
     for name, pair in proposal.after.patches.items():
         print(f"{name}: {pair.mean:.3f} apart on the average, {100 * pair.opposed:.0f} % of it facing the ball")
     session.accept(proposal)
+    session.draw("two_assets.png", camera_from=(0.5, 0.4, 1.0))
     session.undo()
     print("after one undo the hand is at rest:", not session.document.poses)

@@ -17,6 +17,7 @@ with contact.open("shot.usda") as session:
         root = contact.SurfacePoints.at_vertices(ball, [int(np.argmax(side * ball.points[:, 0]))])
         session.pairs.add(name, session.patches.transfer(name, thing, root, direction=[0.0, 1.0, 0.0]))
     session.accept(session.solve(frames=[1, 12]))  # contacts, pose and keys: one undo step of the stage
+    session.draw("usd_shot.png", camera_from=(-0.6, 0.5, 1.0))
     session.save("shot.contact.usda")
 
 with contact.open("shot.contact.usda") as again:

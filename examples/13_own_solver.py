@@ -35,11 +35,15 @@ if __name__ == "__main__":
     plugins = contact.PluginManager([sys.modules[__name__]])
     with contact.new(hand="sample:human_hand", ball="sample:baseball", plugins=plugins) as session:
         rig, ball = session.rigs["hand"], session.geometry.mesh("ball")
+        size = np.ptp(ball.points, axis=0).max()
         for side, name in ((-1.0, "thumb_distal"), (1.0, "index_distal")):
             tip = rig.rest_world[rig.joint_index(name), :3, 3]
-            session.patches.brush("disk", name, surface="hand", at=tip, radius=0.35)
+            session.patches.brush("disk", name, surface="hand", at=tip, radius=0.05 * size)
             root = contact.SurfacePoints.at_vertices(ball, [int(np.argmax(side * ball.points[:, 0]))])
             session.pairs.add(name, session.patches.transfer(name, "ball", root, direction=[0.0, 1.0, 0.0]))
         for solver in ("levenberg-marquardt", "scipy-lbfgs"):
-            found = session.solve(solver=solver).after
+            proposal = session.solve(solver=solver)
+            found = proposal.after
             print(f"{found.solver}: objective {found.value:.4f} after {found.evaluations} evaluations")
+        session.accept(proposal)
+        session.draw("own_solver.png", camera_from=(0.5, 0.4, 1.0))

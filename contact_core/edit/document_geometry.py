@@ -67,6 +67,11 @@ class DocumentGeometry:
 
     # -- surfaces ------------------------------------------------------------------------------------------------
 
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """The surfaces of the document whose mesh was brought."""
+        return tuple(self._derived.meshes(self.document))
+
     def mesh(self, surface: str) -> TriangleMesh:
         """The mesh of a surface."""
         return self._derived.mesh(self.document, surface)

@@ -13,14 +13,15 @@ from contact_core._version import __version__
 from contact_core.atomic_file import write_atomic
 from contact_core.atomic_set import replacing_set
 from contact_core.document.schema import dump_document
-from contact_core.errors import ContactError
+from contact_core.errors import InvalidInput
 from contact_core.grasping.verdict import DEFINITIONS, SCHEMA, table
 from contact_core.job.inputs import inputs_of
 from contact_core.job.job import Job, JobResult
 from contact_core.job.pictures import pictures_of
 from contact_core.job.recipe import Recipe
+from contact_core.plugins.drawing import draw
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import FORMATS, RENDERERS
+from contact_core.plugins.registry import FORMATS
 from contact_core.rig.pose_files import save_pose
 from contact_core.rig.poses import moved_roots
 from contact_core.rig.rig import Pose
@@ -59,7 +60,7 @@ def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
             _write_model(job, stage / files["model"], plugins)
             save_scene(scene_of(job), stage / files["scene"])
         with job.stage("render", 0.8, "Drawing the pictures"):
-            renderer = draw(job, pictures_of(job, rows), stage / files["picture"], plugins)
+            renderer = _draw(job, pictures_of(job, rows), stage / files["picture"], plugins)
         report = report_of(job, renderer)
         write_atomic(stage / files["report"], json.dumps(report, indent=2, allow_nan=False) + "\n")
         written = {role: out / name for role, name in files.items() if (stage / name).exists()}
@@ -67,18 +68,15 @@ def write_outputs(job: Job, out: Path, plugins: PluginManager) -> JobResult:
     return JobResult(job.recipe, report, job.verdict, written, rows)
 
 
-def draw(job: Job, pictures: list[Picture], path: Path, plugins: PluginManager) -> str | None:
+def _draw(job: Job, pictures: list[Picture], path: Path, plugins: PluginManager) -> str | None:
     """Draw with the best renderer that can; its name. What the others lacked goes into the notes."""
-    renderers = sorted(plugins.offers(RENDERERS).values(), key=lambda r: (-r.priority, r.name))
-    for renderer in renderers:
-        try:
-            renderer.render(pictures, path, size=job.recipe.view.size)
-        except ContactError as error:
-            job.notes.append(f"renderer {renderer.name}: {error}")
-        else:
-            return renderer.name
-    job.notes.append("no renderer could draw a picture; everything else was written.")
-    return None
+    try:
+        drawn = draw(pictures, path, plugins, size=job.recipe.view.size)
+    except InvalidInput as error:
+        job.notes.append(f"{error} Everything else was written.")
+        return None
+    job.notes += drawn.passed_over
+    return drawn.renderer
 
 
 def _write_model(job: Job, path: Path, plugins: PluginManager) -> None:

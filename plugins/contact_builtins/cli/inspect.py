@@ -32,10 +32,10 @@ class Inspect:
 
 def _draw(asset: Any, arguments: argparse.Namespace) -> None:
     """The hand's picture by the first renderer that can draw. Raises InvalidInput without a hand or renderer."""
-    from contact_builtins.cli.drawing import draw
     from contact_builtins.cli.hand_picture import hand_pictures
+    from contact_core.plugins.drawing import draw
 
-    draw(hand_pictures(asset), arguments.plugins, arguments.picture)
+    draw(hand_pictures(asset), arguments.picture, arguments.plugins, size=(1600, 800))
 
 
 def _hand_lines(hand: dict[str, Any]) -> list[str]:

@@ -44,10 +44,11 @@ class Repair:
         }
         facts |= {"before": _facts(asset.mesh), "after": _facts(proxy), **_distances(asset.mesh, proxy)}
         if arguments.picture is not None:
-            from contact_builtins.cli.drawing import draw
             from contact_builtins.cli.proxy_picture import proxy_pictures
+            from contact_core.plugins.drawing import draw
 
-            draw(proxy_pictures(asset.mesh, proxy, asset.up_axis), arguments.plugins, arguments.picture)
+            pictures = proxy_pictures(asset.mesh, proxy, asset.up_axis)
+            draw(pictures, arguments.picture, arguments.plugins, size=(1600, 800))
             facts["picture"] = str(arguments.picture)
         if writer is not None:
             writer.write(arguments.out, [_skinned(asset, proxy)], {})

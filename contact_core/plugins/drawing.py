@@ -1,0 +1,38 @@
+"""Drawing with plugins: the best renderer that can."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from contact_core.errors import ContactError, InvalidInput
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import RENDERERS
+from contact_core.scene.picture import Picture
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """renderer: the name of the one that drew. passed_over: of each better one, a sentence on what it lacks."""
+
+    renderer: str
+    passed_over: tuple[str, ...]
+
+
+def draw(
+    pictures: Sequence[Picture], path: Path, plugins: PluginManager, *, size: tuple[int, int] = (1280, 720)
+) -> Drawn:
+    """Draw pictures side by side into a PNG of `size` pixels, with the best renderer that can.
+
+    Raises InvalidInput with what each renderer lacks where none can.
+    """
+    reasons: list[str] = []
+    for renderer in sorted(plugins.offers(RENDERERS).values(), key=lambda r: (-r.priority, r.name)):
+        try:
+            renderer.render(pictures, path, size=size)
+        except ContactError as error:
+            reasons.append(f"renderer {renderer.name}: {error}")
+        else:
+            return Drawn(renderer.name, tuple(reasons))
+    raise InvalidInput("no renderer could draw a picture: " + ("; ".join(reasons) or "no plugin offers one."))
