@@ -42,7 +42,7 @@ if __name__ == "__main__":
             root = contact.SurfacePoints.at_vertices(ball, [int(np.argmax(side * ball.points[:, 0]))])
             session.pairs.add(name, session.patches.transfer(name, "ball", root, direction=[0.0, 1.0, 0.0]))
         for solver in ("levenberg-marquardt", "scipy-lbfgs"):
-            proposal = session.solve(solver=solver)
+            proposal = session.solve(solver=solver, terms=["penetration"])
             found = proposal.after
             print(f"{found.solver}: objective {found.value:.4f} after {found.evaluations} evaluations")
         session.accept(proposal)

@@ -233,3 +233,8 @@ def test_what_the_architecture_names_exists_and_its_picture_is_current() -> None
         assert pkgutil.resolve_name(name) is not None, name
     checked = subprocess.run([sys.executable, str(ROOT / ".ci" / "floors.py"), "--check"], check=False)
     assert checked.returncode == 0, "run python .ci/floors.py: the floors have changed"
+
+
+def test_the_page_of_examples_names_every_script() -> None:
+    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+\.py)`", page, re.MULTILINE) == [path.name for path in SCRIPTS]
