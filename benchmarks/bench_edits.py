@@ -38,7 +38,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bunny", type=Path, default=default_bunny())
     parser.add_argument("--copies", type=int, default=64)
+    parser.add_argument("--host", action="store_true", help="the edits in the memory host alone")
     arguments = parser.parse_args()
+    in_memory_host()
+    if arguments.host:
+        return 0
     mesh, name = scan(arguments.bunny)
     print(f"{name}: {len(mesh.faces)} faces, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     single = edits(mesh, "")
@@ -48,7 +52,6 @@ def main() -> int:
             f"{many[key] / single[key]:.2f}x (bar 1.5x)"
         )
     tree(mesh)
-    in_memory_host()
     history_memory()
     record(f"Edits through the session, journal on: {name}", ROWS)
     return 0
@@ -109,17 +112,17 @@ def in_memory_host() -> None:
     key = host.add(Asset("sheet", TriangleMesh(*host_edits.sheet()), meters_per_unit=1.0))
     with host_edits.painted(host, key) as session:
         document = session.document
-        ROWS.update({f"in the memory host: {name}": row for name, row in host_edits.edits(host, session).items()})
+        rows = host_edits.edits(host, session)
     with tempfile.TemporaryDirectory() as folder, Session(document, discover=False) as session:
         path = Path(folder) / "d.json"
         session.save(path)
 
         def save() -> None:
-            session.set_extra("at", session.revision)
+            session.patches.rotate("patch 0", 0.01)
             session.save()
 
-        taken = host_edits.timed(save, 9)
-        ROWS["save, 30 patches of 500 points"] = f"{1e3 * taken:.1f} ms, {path.stat().st_size:,} bytes"
+        rows["rotate and save the document file"] = f"{host_edits.spelled(save, 9)}; {path.stat().st_size:,} bytes"
+    record(f"{host_edits.TITLE}: memory", rows)
 
 
 def history_memory() -> None:

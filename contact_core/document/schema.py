@@ -246,7 +246,8 @@ def _cycles(document: ContactDocument) -> Iterator[str]:
 
 
 def shape_to_json(shape: PatchShape) -> dict[str, Any]:
-    """JSON-able data of a shape as it stands in a document, the bulk of it as text that is made once."""
+    """JSON-able data of a shape as it stands in a document, the bulk of it as text that is made once for files and
+    hosts."""
     coordinates, weights = _points_texts(shape)
     own = {"axis": to_json(shape.axis), "meters_per_unit": float(shape.meters_per_unit)}
     return {**own, "coordinates": coordinates, "weights": weights}
@@ -254,7 +255,7 @@ def shape_to_json(shape: PatchShape) -> dict[str, Any]:
 
 def _content(document: ContactDocument) -> bytes:
     """The canonical bytes of a document, without a digest."""
-    shapes = {key: shape_to_json(shape) for key, shape in document.shapes.items()}
+    shapes = {key: _shape_text(shape) for key, shape in document.shapes.items()}
     return _canonical(document_to_json(replace(document, shapes=FrozenMap())) | {"shapes": shapes})
 
 
@@ -275,7 +276,15 @@ def _disbelief(source: str, has_digest: bool) -> str:
     )
 
 
+_shape_texts: WeakKeyDictionary[PatchShape, Fragment] = WeakKeyDictionary()
 _kept_texts: WeakKeyDictionary[PatchCoordinates, tuple[FloatArray, Fragment, Fragment]] = WeakKeyDictionary()
+
+
+def _shape_text(shape: PatchShape) -> Fragment:
+    """The text of a shape as it stands in a file, two levels deep, kept from one save to the next."""
+    if shape not in _shape_texts:
+        _shape_texts[shape] = Fragment(pretty(shape_to_json(shape), 2))
+    return _shape_texts[shape]
 
 
 def _points_texts(shape: PatchShape) -> tuple[Fragment, Fragment]:
