@@ -26,6 +26,7 @@ from contact_core.plugins.slots import CliCommand
 
 _OWN = (
     "contact_core.cli.pose:Pose",
+    "contact_core.cli.motion:Motion",
     "contact_core.cli.batch:Batch",
     "contact_core.cli.grasp:Grasp",
     "contact_core.cli.samples:Samples",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
+from contact_core.arrays import FloatArray, IntArray
 from contact_core.contact.point_sets import connected_parts
 from contact_core.document.document import ContactDocument
 from contact_core.document.timeline import Span
@@ -27,6 +27,7 @@ from contact_core.rig.chart import pose_on
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
 from contact_core.scene.problem import world_from_surface
 
+EVEN = 0.005  # of the skin's extent: how much farther from the object than the nearest a vertex still touches
 EASE = 0.2  # seconds over which a contact that was found fades in and out
 
 
@@ -111,7 +112,7 @@ class _Made:
         """A contact. posed: (n, 3) the skin in the object's space where it is closest."""
         rig = self.draft.rigs[hand]
         if (hand, span.joint) not in self._painted:
-            self._painted[hand, span.joint] = self._paint(hand, rig.surface, span)
+            self._painted[hand, span.joint] = self._paint(hand, rig.surface, span, thing, posed)
         patch, centre, beside = self._painted[hand, span.joint]
         way = posed[beside] - posed[centre]
         mesh = self.draft.geometry.mesh(thing)
@@ -130,9 +131,19 @@ class _Made:
         order = sorted(self.found, key=lambda each: each.span.on)
         return Detection(command, ghost, revision, found=tuple(order))
 
-    def _paint(self, hand: str, mesh: TriangleMesh, span: ContactSpan) -> tuple[str, int, int]:
+    def _touching(self, mesh: TriangleMesh, span: ContactSpan, thing: str, posed: FloatArray) -> IntArray:
+        """(k,) the vertices that are about as near as the nearest; those farther off only come near by the bending
+        of the skin, and are no part of what holds."""
+        places = span.object_points.positions(self.draft.geometry.mesh(thing))
+        away = np.linalg.norm(posed[span.vertices] - places, axis=1)
+        limit = float(away.min()) + EVEN * float(np.ptp(posed, axis=0).max())
+        return span.vertices[away <= limit]
+
+    def _paint(
+        self, hand: str, mesh: TriangleMesh, span: ContactSpan, thing: str, posed: FloatArray
+    ) -> tuple[str, int, int]:
         """A patch of the vertices that touch and hang together."""
-        parts = connected_parts(mesh, SurfacePoints.at_vertices(mesh, span.vertices))
+        parts = connected_parts(mesh, SurfacePoints.at_vertices(mesh, self._touching(mesh, span, thing, posed)))
         points = max(parts, key=len)
         places = points.positions(mesh)
         near = np.argsort(np.linalg.norm(places - places.mean(axis=0), axis=1), kind="stable")

@@ -87,13 +87,14 @@ def propose_motion(
     revision: int,
     settings: SolveSettings,
     motion: MotionSettings,
+    scene_keys: Callable[[str], tuple[float, ...]] = lambda name: (),
 ) -> MotionProposal:
     """The motion through frames. timed: the document with its tracks. frame: which one a ghost shows. draft_at: the
-    document at a frame, as the scene has it there.
+    document at a frame, as the scene has it there. scene_keys: where the scene keys the rig of a surface already.
 
     Raises InvalidInput without a pair of a rig that can be posed, Cancelled where nothing was solved.
     """
-    return _Motion(timed, frames, draft_at, plugins, settings, motion).proposal(frame, revision)
+    return _Motion(timed, frames, draft_at, plugins, settings, motion, scene_keys).proposal(frame, revision)
 
 
 class _Motion:
@@ -107,8 +108,9 @@ class _Motion:
         plugins: PluginManager,
         settings: SolveSettings,
         motion: MotionSettings,
+        scene_keys: Callable[[str], tuple[float, ...]],
     ) -> None:
-        self.timed, self.draft_at, self.plugins = timed, draft_at, plugins
+        self.timed, self.draft_at, self.plugins, self.scene_keys = timed, draft_at, plugins, scene_keys
         self.settings, self.motion = settings, motion
         self.rate = timed.timeline.frames_per_second
         asked = sorted({float(frame) for frame in frames})
@@ -142,7 +144,7 @@ class _Motion:
             revision=revision,
             before=by_frame[-1],
             after=by_frame[-1],
-            keys=_by_frame({name: done.keys for name, done in linear.items()}),
+            keys=self._scene_keys(poses, {name: done.keys for name, done in linear.items()}),
             solutions=tuple(by_frame[row] for row, f in enumerate(self.frames) if self._is_asked(f)),
             motion=solution,
             reductions=cubic,
@@ -268,6 +270,20 @@ class _Motion:
             poses.append(box.pose(pose) if isinstance(box, EvaluatedRig) else pose)
         return tuple(poses)
 
+    def _scene_keys(
+        self, poses: Mapping[str, tuple[Pose, ...]], keys: Mapping[str, PoseKeys]
+    ) -> dict[float, dict[str, Pose]]:
+        """What the scene gets, by frame: the keys, and the pose at each key that it has within the range already,
+        or what lies between would stay as it was."""
+        result: dict[float, dict[str, Pose]] = {}
+        for name, found in keys.items():
+            solved = dict(zip(self.frames, poses[name], strict=True))
+            there = {f for f in self.scene_keys(name) if self.frames[0] <= f <= self.frames[-1]}
+            for frame in {*found.frames, *there}:
+                pose = solved[frame] if frame in solved else found.at(self.rigs[name], frame)
+                result.setdefault(frame, {})[name] = pose
+        return dict(sorted(result.items()))
+
     def _reduced(self, name: str, poses: tuple[Pose, ...], kind: str) -> Reduction:
         rig = self.rigs[name]
         keep = [key.frame for key in self._tracks().get(name, ()) if key.is_authored and key.frame in self.frames]
@@ -300,14 +316,6 @@ def _authored(keys: Sequence[PoseKey]) -> list[float]:
 
 def _pose_in(problem: PoseProblem, name: str) -> Pose:
     return problem.bodies[problem.body_index(name)].pose
-
-
-def _by_frame(keys: Mapping[str, PoseKeys]) -> dict[float, dict[str, Pose]]:
-    result: dict[float, dict[str, Pose]] = {}
-    for name, found in keys.items():
-        for frame, pose in zip(found.frames, found.poses, strict=True):
-            result.setdefault(frame, {})[name] = pose
-    return dict(sorted(result.items()))
 
 
 def _solutions(solution: MotionSolution) -> list[PoseSolution]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.document.document import ContactDocument
+from contact_core.document.timeline import address
 from contact_core.edit.derived import Derived
 from contact_core.errors import CommandRejected
 from contact_core.progress import NO_PROGRESS, Progress
@@ -124,7 +126,7 @@ class ProposingSession(ABC):
         else:
             found = propose_motion(
                 self.timed_document, self.timeline.frame, frames, self._draft, self.plugins, self.revision,
-                settings, motion or MotionSettings(),
+                settings, motion or MotionSettings(), self.binding.pose_keys,
             )  # fmt: skip
         self.show_ghost(found)
         return found
@@ -205,12 +207,20 @@ class ProposingSession(ABC):
         if proposal.revision == self.revision:
             self.show_ghost(None)
 
+    def scene_at(self, frame: float) -> ContactDocument:
+        """The document at a frame, without time, with things placed and posed as the scene has them there; what has
+        keys of its own place in the document stands as those say."""
+        still = self.timed_document.at(frame)
+        read = self.binding.read(still, frame)
+        placed = (name for name in still.surfaces if address("place", name) in self.timed_document.tracks)
+        surfaces = read.surfaces.updated({name: still.surfaces[name] for name in placed})
+        return read if surfaces is read.surfaces else replace(read, surfaces=surfaces)
+
     def _draft(self, frame: float | None = None) -> Draft:
         """The document as the scene has it at a frame, to work on."""
         from contact_core.proposals.draft import Draft
 
-        still = self.document if frame is None else self.timed_document.at(frame)
-        document = self.binding.read(still, frame)
+        document = self.binding.read(self.document, None) if frame is None else self.scene_at(frame)
         posed = {
             document.patch(end).surface
             for pair in document.pairs.values()

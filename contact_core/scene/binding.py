@@ -255,6 +255,13 @@ class Binding:
                 raise CommandRejected(f"the host {getattr(self._host, 'name', '')} cannot pose the rig {name!r}.")
             self._host.write_pose(found.object_id, pose, frame)
 
+    def pose_keys(self, name: str) -> tuple[float, ...]:
+        """Frames at which the scene keys the rig behind a surface."""
+        found = self.surfaces.get(name)
+        if found is None or found.rig is None or name in self.missing or not isinstance(self._host, PoseWriting):
+            return ()
+        return self._host.pose_keys(found.object_id)
+
     def follow(self, before: ContactDocument, after: ContactDocument) -> None:
         """Write to the scene what an edit changed of the poses: a pose taken away is the rest pose."""
         changed = {name: pose for name, pose in after.poses.items() if before.poses.get(name) is not pose}

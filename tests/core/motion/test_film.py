@@ -296,3 +296,31 @@ def test_nothing_is_proposed_where_nothing_touches_and_the_rest_is_said() -> Non
 
 def _stop() -> None:
     raise Cancelled("enough")
+
+
+def test_a_clip_in_a_scene_is_repaired_at_its_own_keys() -> None:
+    """The scene's keys within the range take part: what lies between would stay as it slipped."""
+    known = visit(0.02)
+    host = contact.MemoryHost()
+    rig = known.rigs["arm"]
+    host.add(contact.Asset("arm", rig.surface, rig, meters_per_unit=1.0))
+    host.add(contact.Asset("floor", known.geometry.mesh("floor"), meters_per_unit=1.0))
+    track = known.timeline.track("pose", "arm")
+    assert track is not None
+    for key in track.of(PoseKey):
+        host.write_pose("arm", key.pose, key.frame)
+    host.write_pose("arm", contact.Pose.rest(rig), 60.0)  # beyond the range
+    with contact.Session(host=host, objects=None, discover=False) as session:
+        session.timeline.set(0, 48)
+        session.accept(session.detect(options=DetectionOptions(near=0.04, far=0.08)))
+        weights = MotionWeights(skate=50.0, follow=100.0)
+        found = session.solve(
+            frames=session.timeline.settings.frames(), motion=MotionSettings(weights=weights), prior="current"
+        )
+        session.accept(found)
+        assert isinstance(found, MotionProposal) and found.motion is not None
+        assert host.pose_keys("arm") == (*map(float, range(49)), 60.0)
+        for frame in (0.0, 20.0, 37.0):
+            wanted = found.motion.by_frame[int(frame)]["arm"]
+            assert np.abs(host.read_pose("arm", frame).local - wanted.local).max() < 1e-5
+        assert np.abs(host.read_pose("arm", 60.0).local - rig.rest_local).max() < 1e-5

@@ -1,0 +1,96 @@
+"""`contact motion`: a scene's film solved, keyed, reported and drawn, and opened again."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import contact_core as contact
+from contact_core.cli import main
+from contact_core.job.film import picture_at, pictures_of, write_movie, write_strip
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
+from test_film import ARM, BALL, assets, film  # type: ignore[import-not-found]
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    host = contact.MemoryHost()
+    for asset in assets().values():
+        host.add(asset)
+    path = tmp_path / "shot.contactscene"
+    with contact.Session(host=host, objects=None) as session:
+        film(session)
+        session.save(path)
+    return path
+
+
+def test_a_film_is_solved_keyed_reported_and_drawn(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before, out = scene.read_bytes(), scene.parent / "out"
+    assert main(["motion", str(scene), "--out", str(out), "--json", "--no-pictures"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert scene.read_bytes() == before  # the scene that came is untouched
+    report = json.loads((out / "motion.json").read_text())
+    assert told["report"] == report and report["status"] == "CONVERGED" and report["keys"][ARM] >= 2
+    assert report["key_error"][ARM] <= 1.01e-3 and report["pairs"]["touch"]["frames"] == 13
+    with contact.open(out / "shot.keyed.contactscene") as again:
+        track = again.timeline.track("pose", ARM)
+        assert track is not None and len(track.keys) == report["keys"][ARM] and again.timeline.stale(ARM) == ()
+        assert again.host.pose_keys(ARM)[0] == 0.0 and again.host.pose_keys(ARM)[-1] == 24.0
+        shown, keyed = again.host.read_pose(ARM, 12.0), again.timeline.at(12).poses[ARM]
+        assert np.abs(shown.local - keyed.local).max() < 5e-3  # linear and cubic keys of one motion
+
+
+def test_a_strip_and_a_movie(scene: Path) -> None:
+    with contact.open(scene) as session:
+        frames = [0.0, 8.0, 20.0]
+        write_strip(session, frames, scene.parent / "strip.png", count=2, panel=(48, 40))
+        write_movie(session, frames, scene.parent / "film.gif", size=(48, 40))
+        with pytest.raises(contact.InvalidInput, match="a movie has"):
+            write_movie(session, [], scene.parent / "none.gif")
+    with Image.open(scene.parent / "strip.png") as strip:
+        assert strip.size == (96, 40)
+    with Image.open(scene.parent / "film.gif") as movie:
+        assert movie.n_frames == 3 and movie.info["duration"] in (40, 42)  # hundredths of a second
+
+
+def test_pictures_show_what_moves_through_one_camera(scene: Path) -> None:
+    with contact.open(scene) as session:
+        first, last = pictures_of(session, [0.0, 20.0])
+        assert np.array_equal(first.focus, last.focus)
+        assert not np.allclose(first.meshes[1].mesh.points, last.meshes[1].mesh.points)  # the ball
+        assert not first.points and len(last.points) == 2  # the contact is on
+        assert picture_at(session, 20.0).caption == "frame 20"
+        assert session.document.surfaces[BALL].name == BALL
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--frames", "a"], "frames are like"),
+        (["--frames", "5-1"], "frames are like"),
+        (["--follow", "-1"], "follow"),
+        (["--tolerance", "0"], "tolerance"),
+    ],
+)
+def test_bad_arguments_are_refused_in_a_sentence(
+    arguments: list[str], says: str, scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["motion", str(scene), "--out", str(scene.parent / "none"), *arguments]) == 2
+    assert says in capsys.readouterr().err and not (scene.parent / "none").exists()
+
+
+def test_a_still_has_no_film(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    host = contact.MemoryHost()
+    for asset in assets().values():
+        host.add(asset)
+    host.save(tmp_path / "still.contactscene")
+    assert main(["motion", str(tmp_path / "still.contactscene"), "--out", str(tmp_path / "out")]) == 2
+    assert "no range of frames" in capsys.readouterr().err
+    (tmp_path / "broken.contactscene").write_bytes(b"nonsense")
+    assert main(["motion", str(tmp_path / "broken.contactscene"), "--out", str(tmp_path / "out")]) == 2
