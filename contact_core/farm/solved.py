@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from contact_core.solve.solver import PoseSolution
 
 THUMBNAIL = "picture.png"
-SIZE = (384, 288)  # pixels
+SIZE = (320, 240)  # pixels
 _SKIN, _THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 _LIMIT = ACCEPT["mean_contact_distance"][1]  # of the manipulator's length: what a grasp is judged by
 

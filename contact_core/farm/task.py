@@ -148,8 +148,7 @@ def perform(task: Task) -> Result:
 
     limit = _Limit(task.limit)
     try:
-        outcome, inputs = _run(task, limit)
-        took = time.perf_counter() - began
+        outcome, inputs, took = _run(task, limit)
         thumbnail = "" if outcome.picture is None else thumbnail_of(Path(task.folder) / outcome.picture)
         result = Result(
             task.name, "done", badness=outcome.badness, failures=outcome.failures, rows=outcome.rows,
@@ -173,8 +172,11 @@ def perform(task: Task) -> Result:
     return result
 
 
-def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any]]:
-    """The job itself, and the files that it read. The old receipt goes first: the results are about to change."""
+def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float]:
+    """The job itself, the files that it read, and its seconds.
+
+    The old receipt goes first: the results are about to change.
+    """
     if task.version != __version__:
         raise InvalidInput(
             f"this worker has contact-core {__version__}, and the batch was started with {task.version}. Install"
@@ -185,12 +187,14 @@ def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any]]:
         (folder / RECEIPT).unlink()
     kind = plugins_of_this_process().get(JOB_KINDS, task.kind)
     request = JobRequest(path, folder, task.frames, task.solver, None if task.assets is None else Path(task.assets))
+    began = time.perf_counter()
     with noting_files() as found:
         outcome = kind.run(request, plugins_of_this_process(), progress)
+    took = time.perf_counter() - began
     inside = os.path.realpath(folder) + os.sep
     paths = {*found, *map(os.path.realpath, outcome.inputs), os.path.realpath(path)}
     paths = {path for path in paths if not path.startswith(inside)}
-    return outcome, list(as_read(paths, path, Digests()))
+    return outcome, list(as_read(paths, path, Digests())), took
 
 
 @cache

@@ -1,0 +1,141 @@
+"""The farm: what it costs beside the work, on 1 and 2 workers; what a second run costs; workers that are killed.
+
+    python -m benchmarks.bench_farm [--quick] [--shots N]
+
+Shots are small documents: a finger on a ball, a tenth of a second of work each, most of it the picture, so that what
+the farm adds is seen. Wall time; the kernels are compiled before. "Work" is what the jobs themselves took, in their
+workers; what is beside it is the farm's, after the start of the workers, which is told by itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import contact_core as contact
+from benchmarks.harness import record
+from contact_core.document.schema import dump_document
+from contact_core.farm.batch import BatchResult, BatchSettings, run_batch
+from contact_core.farm.task import RECEIPT
+from contact_core.farm.workers import KILL, LocalWorkers
+from contact_core.geometry.warm_up import warm_up
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import FORMATS
+from contact_core.testing import meshes
+from contact_core.testing.format_contract import bar
+
+SHOTS = 1000
+KILLS = 20
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="60 shots")
+    parser.add_argument("--shots", type=int, help=f"how many ({SHOTS})")
+    arguments, _ = parser.parse_known_args()
+    count = arguments.shots or (60 if arguments.quick else SHOTS)
+    warm_up()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_shots(folder / "shots", count)
+        rows: dict[str, str] = {"shots": str(count)}
+        started = {workers: start_of(folder, workers) for workers in (1, 2)}
+        runs = {workers: timed(folder, workers) for workers in (1, 2)}
+        for workers, run in runs.items():
+            rows[f"{workers} worker{'s' * (workers > 1)}"] = spelled(run, workers, started[workers])
+        rows["2 workers against 1"] = f"{runs[1].seconds / runs[2].seconds:.2f} times as fast"
+        again = run_batch([folder / "shots"], folder / "out 1")
+        rows["again, nothing has changed"] = f"{again.seconds:.2f} s, {1e3 * again.seconds / count:.2f} ms a shot"
+        rows[f"killed at random {KILLS} times"] = killed(folder)
+    record("Farm", rows)
+
+
+def write_shots(folder: Path, count: int) -> None:
+    """Documents that differ in where the ball stands, and their two assets."""
+    folder.mkdir()
+    gltf = PluginManager().offers(FORMATS)["gltf"]
+    ball = meshes.icosphere(2)
+    gltf.write(folder / "finger.glb", [bar()], {})
+    gltf.write(folder / "ball.glb", [contact.Asset("ball", ball.with_points(0.5 * ball.points))], {})
+    with contact.new(finger=folder / "finger.glb", ball=folder / "ball.glb") as session:
+        skin, thing = session.geometry.mesh("finger"), session.geometry.mesh("ball")
+        tip = np.argsort(-skin.points[:, 2], kind="stable")[:5]
+        points = contact.SurfacePoints.at_vertices(skin, tip)
+        session.patches.paint("tip", points, surface="finger", axis=points[[0, 3]])
+        root = contact.SurfacePoints.at_vertices(thing, [int(np.argmin(thing.points[:, 2]))])
+        session.pairs.add("tip", session.patches.transfer("tip", "ball", root, heading=1.0 + 0.0j))
+        place = np.eye(4)
+        for number in range(count):
+            place[:3, 3] = (0.4 + 0.3 * number / count, 0.2, 1.6)
+            session.surfaces.place("ball", place)
+            (folder / f"shot{number:04d}.json").write_bytes(dump_document(session.timed_document))
+
+
+def timed(folder: Path, workers: int) -> BatchResult:
+    """All shots on so many workers, into a folder of their own."""
+    result = run_batch([folder / "shots"], folder / f"out {workers}", workers=LocalWorkers(workers))
+    assert result.is_done
+    return result
+
+
+def start_of(folder: Path, workers: int) -> float:
+    """Seconds until so many workers are ready and at work: a batch of as many shots, without their work."""
+    shots = sorted((folder / "shots").glob("*.json"))[:workers]
+    result = run_batch(shots, folder / f"start {workers}", workers=LocalWorkers(workers))
+    return result.seconds - max(each.seconds for each in result.results)
+
+
+def spelled(run: BatchResult, workers: int, start: float) -> str:
+    """Wall time, work, and what the farm adds to each shot."""
+    work, count = sum(result.seconds for result in run.results), len(run.results)
+    beside = (run.seconds - start) * workers - work
+    return (
+        f"{run.seconds:.1f} s, of it {start:.1f} s until they work; work {work:.1f} s ({1e3 * work / count:.0f} ms a"
+        f" shot); beside it {1e3 * beside / count:.1f} ms a shot, {100 * beside / work:.1f} % of the work (wanted:"
+        f" under 5 %{'' if beside < 0.05 * work else '; MISSED'})"
+    )
+
+
+def killed(folder: Path) -> str:
+    """Workers are killed at random moments; every shot must have the results that it has without that."""
+    workers, over, count = LocalWorkers(2), threading.Event(), 0
+
+    def kill() -> None:
+        nonlocal count
+        rng = random.Random(1)
+        while count < KILLS and not over.wait(rng.uniform(0.2, 1.0)):
+            running = workers.processes()
+            if running:
+                os.kill(rng.choice(running), KILL)
+                count += 1
+
+    killer = threading.Thread(target=kill)
+    began = time.perf_counter()
+    killer.start()
+    result = run_batch([folder / "shots"], folder / "out killed", BatchSettings(retries=100), workers=workers)
+    over.set()
+    killer.join()
+    lost = sum(
+        results_of(folder / "out 1", r.name) != results_of(folder / "out killed", r.name) for r in result.results
+    )
+    return (
+        f"{count} kills, {lost} of {len(result.results)} results lost or other, {time.perf_counter() - began:.1f} s"
+    )
+
+
+def results_of(out: Path, name: str) -> dict[str, bytes]:
+    """The bytes of all results of a shot but its receipt."""
+    return {path.name: path.read_bytes() for path in sorted((out / name).glob("*")) if path.name != RECEIPT}
+
+
+if __name__ == "__main__":
+    main()
