@@ -89,11 +89,12 @@ def _triangulate(layout: ComplexArray, positions: FloatArray) -> IntArray:
 def _loops(triangles: IntArray) -> tuple[tuple[int, ...], ...]:
     """The edges that one triangle alone has, joined into loops."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    present = set(map(tuple, edges.tolist()))
+    n = int(edges.max()) + 1
+    there = np.unique(edges[:, 0] * n + edges[:, 1])  # an edge as one number: of a patch of any size, all at once
+    back = (there % n) * n + there // n
     onward: dict[int, list[int]] = {}
-    for a, b in sorted(present):
-        if (b, a) not in present:
-            onward.setdefault(a, []).append(b)
+    for edge in there[~np.isin(back, there, assume_unique=True)].tolist():
+        onward.setdefault(edge // n, []).append(edge % n)
     loops = []
     while onward:
         start = min(onward)

@@ -24,3 +24,19 @@ def test_the_boundary_of_a_turned_grid_is_its_whole_rim(seed: int) -> None:
     area = measure_area(shape, np.column_stack([layout.real, layout.imag, np.zeros(n)]))
     rim = (row == 0) | (row == rows - 1) | (column == 0) | (column == columns - 1)
     assert [sorted(loop) for loop in area.boundary] == [np.flatnonzero(rim).tolist()]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_loops_hold_every_edge_of_one_triangle_once(seed: int) -> None:
+    """Of scattered points with gaps: counted edge by edge."""
+    random = np.random.default_rng(seed)
+    layout = random.uniform(0.0, 1.0, 300) + 1j * random.uniform(0.0, 1.0, 300)
+    layout = layout[np.abs(layout - 0.5 - 0.5j) > 0.2]
+    n = len(layout)
+    scattered = PatchCoordinates(np.zeros(n, np.int64), layout, np.zeros(n + 1, np.int64), np.zeros(0), np.zeros(0))
+    shape = PatchShape(AxisShape(np.zeros(0), np.zeros(0)), scattered, np.ones(n))
+    area = measure_area(shape, np.column_stack([layout.real, layout.imag, np.zeros(n)]))
+    sides = [(t[k], t[(k + 1) % 3]) for t in area.triangles.tolist() for k in range(3)]
+    rim = sorted(side for side in sides if side[::-1] not in sides)
+    looped = [(loop[k - 1], loop[k]) for loop in area.boundary for k in range(len(loop))]
+    assert sorted(looped) == rim
