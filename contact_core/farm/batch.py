@@ -261,7 +261,8 @@ def _facts(results: Sequence[Result], tasks: Mapping[str, Task], seconds: float,
             "folder": tasks[result.name].folder, "state": result.state, "good": result.is_good,
             "badness": result.badness, "sentence": result.sentence, "details": result.details,
             "failures": list(result.failures), "notes": list(result.notes), "files": list(result.files),
-            "seconds": round(result.seconds, 3), "attempts": result.attempts, "worker": result.worker,
+            "seconds": round(result.seconds, 3), "cpu_seconds": round(result.cpu, 3),
+            "attempts": result.attempts, "worker": result.worker,
         }
         for result in results
     ]  # fmt: skip

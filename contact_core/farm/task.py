@@ -63,7 +63,8 @@ class Result:
     """How a job ended. state: "done" (now), "same" (earlier, and nothing has changed), "failed" or "stopped".
 
     sentence: why it failed. details: a traceback, where the failure is a fault of the program. again: whether
-    another attempt may go better. thumbnail: a data URI. seconds: of the work itself.
+    another attempt may go better. thumbnail: a data URI. seconds, cpu: of the work itself, by the clock and of a
+    core.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Result:
     files: tuple[str, ...] = ()
     thumbnail: str = ""
     seconds: float = 0.0
+    cpu: float = 0.0
     worker: str = ""
     attempts: int = 1
 
@@ -133,6 +135,7 @@ def result_of(data: Mapping[str, Any]) -> Result:
         notes=tuple(map(str, data["notes"])),
         files=tuple(map(str, data["files"])),
         seconds=float(data["seconds"]),
+        cpu=float(data["cpu"]),
         attempts=int(data["attempts"]),
     )
 
@@ -148,11 +151,11 @@ def perform(task: Task) -> Result:
 
     limit = _Limit(task.limit)
     try:
-        outcome, inputs, took = _run(task, limit)
+        outcome, inputs, took, cpu = _run(task, limit)
         thumbnail = "" if outcome.picture is None else thumbnail_of(Path(task.folder) / outcome.picture)
         result = Result(
             task.name, "done", badness=outcome.badness, failures=outcome.failures, rows=outcome.rows,
-            notes=outcome.notes, files=outcome.files, thumbnail=thumbnail, seconds=took, worker=where,
+            notes=outcome.notes, files=outcome.files, thumbnail=thumbnail, seconds=took, cpu=cpu, worker=where,
         )  # fmt: skip
         receipt = {"schema": SCHEMA, "version": VERSION, "key": task.key, "kind": task.kind,
                    "contact_core": __version__, "inputs": inputs, "result": asdict(result)}  # fmt: skip
@@ -172,8 +175,8 @@ def perform(task: Task) -> Result:
     return result
 
 
-def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float]:
-    """The job itself, the files that it read, and its seconds.
+def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float, float]:
+    """The job itself, the files that it read, and its seconds by the clock and of a core.
 
     The old receipt goes first: the results are about to change.
     """
@@ -187,14 +190,14 @@ def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float]:
         (folder / RECEIPT).unlink()
     kind = plugins_of_this_process().get(JOB_KINDS, task.kind)
     request = JobRequest(path, folder, task.frames, task.solver, None if task.assets is None else Path(task.assets))
-    began = time.perf_counter()
+    began, cpu = time.perf_counter(), time.process_time()
     with noting_files() as found:
         outcome = kind.run(request, plugins_of_this_process(), progress)
-    took = time.perf_counter() - began
+    took, cpu = time.perf_counter() - began, time.process_time() - cpu
     inside = os.path.realpath(folder) + os.sep
     paths = {*found, *map(os.path.realpath, outcome.inputs), os.path.realpath(path)}
     paths = {path for path in paths if not path.startswith(inside)}
-    return outcome, list(as_read(paths, path, Digests())), took
+    return outcome, list(as_read(paths, path, Digests())), took, cpu
 
 
 @cache
