@@ -24,6 +24,8 @@ from contact_core.errors import ContactError, FileRefused
 MAX_ARRAY = 50_000_000  # numbers in one array: beyond any patch, below any memory bomb
 MAX_DEPTH = 100  # levels of free JSON data: writing and reading go a few calls deep for each
 ROW = 12  # numbers on a line of the written file
+_NUMBERS = {int, float}
+_dump = json.JSONEncoder(allow_nan=False).encode  # json.dumps makes an encoder for each call
 
 
 def to_json(value: Any, annotation: Any = Any) -> Any:
@@ -104,7 +106,7 @@ def pretty(data: Any, indent: int = 0) -> str:
         return "[\n" + ",\n".join(pad + pretty(item, indent + 1) for item in data) + "\n" + " " * indent + "]"
     if isinstance(data, list) and len(data) > ROW:
         return _rows(data, pad, indent)
-    return json.dumps(data, allow_nan=False)
+    return _dump(data)
 
 
 def _is_row(item: Any) -> bool:
@@ -113,7 +115,12 @@ def _is_row(item: Any) -> bool:
 
 
 def _rows(data: list[Any], pad: str, indent: int, per_line: int = ROW) -> str:
-    rows = (json.dumps(data[k : k + per_line], allow_nan=False)[1:-1] for k in range(0, len(data), per_line))
+    starts = range(0, len(data), per_line)
+    if _NUMBERS.issuperset(map(type, data)):  # encoded at once: a call of the encoder costs more than a row
+        numbers = _dump(data)[1:-1].split(", ")
+        rows = [", ".join(numbers[k : k + per_line]) for k in starts]
+    else:
+        rows = [_dump(data[k : k + per_line])[1:-1] for k in starts]
     return "[\n" + ",\n".join(pad + row for row in rows) + "\n" + " " * indent + "]"
 
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping, ValuesView
 from typing import Any, Generic, TypeVar
 
 V = TypeVar("V")
@@ -31,6 +31,16 @@ class FrozenMap(Mapping[str, V], Generic[V]):
 
     def __contains__(self, name: object) -> bool:
         return name in self._items
+
+    # Views of the dict itself: those of Mapping ask for each key in Python, and edits scan thousands of patches.
+    def keys(self) -> KeysView[str]:
+        return self._items.keys()
+
+    def values(self) -> ValuesView[V]:
+        return self._items.values()
+
+    def items(self) -> ItemsView[str, V]:
+        return self._items.items()
 
     def __repr__(self) -> str:
         return f"FrozenMap({self._items!r})"
