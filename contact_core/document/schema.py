@@ -89,14 +89,6 @@ def parse_with_digest(text: bytes, source: str = "the document") -> tuple[Contac
     return document, str(stated) if known else document_digest(document)
 
 
-def stated_digest(text: bytes) -> str | None:
-    """The digest that a document as `dump_document` wrote it states of itself; None where it lies otherwise."""
-    head = text[: len(_DIGEST_LINE) + 80].split(b"\n", 2)
-    if len(head) < 2 or not head[1].startswith(_DIGEST_LINE):
-        return None
-    return head[1].removeprefix(_DIGEST_LINE).strip(b'", ').decode("ascii", "replace")
-
-
 def written_digest(text: bytes) -> str:
     """The digest of a document file that lies as `dump_document` wrote it; any other file gets another digest."""
     return _digest(written_content(text))

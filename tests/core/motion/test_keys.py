@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,7 +13,6 @@ from contact_core.errors import Cancelled, InvalidInput
 from contact_core.motion.reduction import reduce_poses, skin_errors
 from contact_core.progress import CallbackProgress
 from contact_core.rig.chart import Chart
-from contact_core.rig.pose_files import load_keys, save_keys
 from contact_core.rig.pose_keys import PoseCurves, PoseKeys, quaternion_slopes, turning_of
 from contact_core.rig.poses import blend
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
@@ -154,14 +151,6 @@ def test_editing_cubic_keys_keeps_them_cubic_and_the_far_ones_in_place() -> None
     assert np.allclose(back.at(RIG, between).local, keys.at(RIG, between).local)
     ends = keys.with_key(200.0, keys.poses[0])
     assert not ends.speeds[-1].any()
-
-
-def test_cubic_keys_come_back_from_files_to_the_bit(tmp_path: Path) -> None:
-    keys = cubic()
-    save_keys(tmp_path / "k.json", keys)
-    loaded = load_keys(tmp_path / "k.json")
-    assert loaded.frames == keys.frames
-    assert all(np.array_equal(a, b) for a, b in zip(loaded.speeds, keys.speeds, strict=True))
 
 
 def test_what_does_not_fit_is_refused_in_words() -> None:

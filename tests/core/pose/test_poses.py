@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.rig.chart import Chart
-from contact_core.rig.pose_files import PoseLibrary, load_keys, load_pose, save_keys, save_pose
+from contact_core.rig.pose_files import load_pose, save_pose
 from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.poses import blend, mirrored_name, mirrored_pose, set_angles
 from contact_core.rig.rig import JointFreedom, Pose, Rig, forward_kinematics, skin
@@ -135,11 +135,6 @@ def test_files_come_back_to_the_bit(tmp_path: Path) -> None:
     again = load_pose(tmp_path / "a.json")
     assert again.joints == pose.joints
     assert np.array_equal(again.local, pose.local)
-    keys = PoseKeys("hand").with_key(12.5, pose).with_key(1, random_pose(6))
-    save_keys(tmp_path / "k.json", keys)
-    loaded = load_keys(tmp_path / "k.json")
-    assert loaded.frames == (1.0, 12.5)
-    assert all(np.array_equal(a.local, b.local) for a, b in zip(loaded.poses, keys.poses, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -154,21 +149,6 @@ def test_damaged_files_are_refused_in_words(tmp_path: Path, content: str) -> Non
     with pytest.raises(FileRefused) as refusal:
         load_pose(path)
     assert "bad.json" in str(refusal.value)
-
-
-def test_library(tmp_path: Path) -> None:
-    library = PoseLibrary(tmp_path / "poses")
-    assert library.names() == []
-    library.save("fist (tight)", random_pose(1))
-    library.save("open", random_pose(2))
-    assert library.names() == ["fist (tight)", "open"]
-    assert np.array_equal(library.load("open").local, random_pose(2).local)
-    with pytest.raises(FileRefused, match="fist"):
-        library.load("point")
-    with pytest.raises(InvalidInput):
-        library.save("../escape", random_pose(1))
-    library.remove("open")
-    assert library.names() == ["fist (tight)"]
 
 
 def test_keys_blend_between_and_hold_beyond() -> None:
