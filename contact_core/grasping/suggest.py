@@ -32,6 +32,7 @@ from contact_core.grasping.facts import (
     skin_through,
     uneven_curl,
 )
+from contact_core.grasping.filled import KeepOutTerm, filled
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.metrics import Contact, PosedScene, measure
 from contact_core.grasping.pads import painted_pads
@@ -47,7 +48,6 @@ from contact_core.rig.bones import bone_segments
 from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.scene.problem import Objective, world_from_surface
 from contact_core.solve.body import uniform_scale
-from contact_core.solve.penetration import PenetrationTerm
 from contact_core.solve.solver import PoseSolution, SolveOptions
 from contact_core.solve.terms import PoseTerm, paper_terms
 
@@ -64,6 +64,8 @@ SECOND_LOOK = 220  # approaches that are closed with all starts of the thumb
 MORE = {"power": 3.0}  # times as many approaches of a kind as of others
 TURNS = ("power", "power", "precision", "power", "pinch", "power", "hook")  # one after the other
 WORSE, HOPELESS = 1.1, -0.6  # a first look that is worse than the best by so much, and below that, is not tried
+FILLED = 0.2  # hand lengths: what a ball of this radius does not reach is filled
+OUTSIDE = 0.015  # hand lengths: a closed hand that is no deeper in the filled object keeps out of all of it
 UNFIT = 0.03  # hand lengths from its place, after solving, at which a proposed pad is given up
 FACES = 0.35  # share of a pad that has to face the object within 45 degrees
 PENETRATION = 16.0
@@ -165,19 +167,30 @@ class GraspScene:
     def field(self) -> DistanceField:
         return DistanceField.of(self.mesh, resolution=self.resolution)
 
-    def terms(self) -> tuple[PoseTerm, ...]:
-        """The paper's, depth, and self-collision where a plugin offers it."""
+    @cached_property
+    def solid(self) -> DistanceField:
+        """The object with its hollows filled (`filled`)."""
+        return filled(self.field, FILLED * self.hand.length)
+
+    def terms(self, whole: bool) -> tuple[PoseTerm, ...]:
+        """The paper's, depth, and self-collision where a plugin offers it. whole: hollows are solid, too."""
         result: tuple[PoseTerm, ...] = paper_terms()
-        result += (PenetrationTerm(weight=PENETRATION, resolution=self.resolution),)
+        kept = self.solid if whole else self.field
+        scale = uniform_scale_of(self)
+        own = DistanceField(kept.origin / scale, kept.spacing / scale, kept.values / scale)
+        result += (KeepOutTerm(weight=PENETRATION, resolution=48, fields={self.object_name: own}),)
         if "self-collision" in self.plugins.offers(POSE_TERMS):
             result += (self.plugins.make(POSE_TERMS, "self-collision"),)
         return result
 
-    def settings(self) -> SolveSettings:
-        """How grasps are solved: from the closed hand, digits and root free, a body's other joints as they are."""
+    def settings(self, whole: bool) -> SolveSettings:
+        """How grasps are solved: from the closed hand, digits and root free, a body's other joints as they are.
+
+        whole: whether the object's hollows are solid, too.
+        """
         rig = self.rig
         moving = [rig.joints[j] for j in {*np.flatnonzero(rig.parents < 0).tolist(), *self.hand.joints.tolist()}]
-        objective = Objective(self.terms(), free={self.hand_name: moving}, length=self.hand.length)
+        objective = Objective(self.terms(whole), free={self.hand_name: moving}, length=self.hand.length)
         return SolveSettings(objective=objective, options=SolveOptions(candidates=AGAIN, max_iterations=60))
 
 
@@ -295,23 +308,24 @@ def _finished(
     left_out = _place(scene, draft, wanted)
     if len(wanted) - len(left_out) < 2:
         return None
+    whole = bool(scene.solid.distances(_stands(scene, draft)[1].points).min() > -OUTSIDE * hand.length)
     try:
-        solution = _settled(scene, draft)
+        solution = _settled(scene, draft, whole)
         if proposed and (bad := _unfit(scene, solution)) and len(draft.document.pairs) - len(bad) >= 2:
             for name, why in bad.items():
                 target = draft.document.pairs[name].object
                 draft.pairs.remove(name)
                 draft.patches.remove(target)
                 left_out[name] = why
-            solution = _settled(scene, draft)
+            solution = _settled(scene, draft, whole)
     except InvalidInput:
         return None
     return _judged(scene, draft, solution, approach, closed, left_out, len(wanted), proposed, score)
 
 
-def _settled(scene: GraspScene, draft: RecordingDraft) -> PoseSolution:
+def _settled(scene: GraspScene, draft: RecordingDraft, whole: bool) -> PoseSolution:
     """Solve, contacts to where they then face the object, solve again; the better of both."""
-    settings = scene.settings()
+    settings = scene.settings(whole)
     found = settle(draft.document, draft.copy(), scene.plugins, scene.revision, settings, rounds=1)
     draft.do(found.command)
     return found.after

@@ -58,7 +58,7 @@ class PenetrationTerm(HasSettings):
     name: str = field(default="penetration")
 
     def bind(self, problem: PoseProblem) -> BoundTerm:
-        solids = solids_of(problem, self.solids, self.resolution)
+        solids = self.solids_in(problem)
         if not solids:
             raise InvalidInput("the penetration term needs a rigid body to stay out of, but the problem has none.")
         skins = []
@@ -71,6 +71,10 @@ class PenetrationTerm(HasSettings):
                 weights = self.weight / REFERENCE_AREA * areas
                 skins.append(_Skin(body.name, track, weights, np.zeros(len(vertices))))
         return _Depths(problem.unit, skins, solids)
+
+    def solids_in(self, problem: PoseProblem) -> dict[str, Solid]:
+        """What is solid, by body."""
+        return solids_of(problem, self.solids, self.resolution)
 
 
 class Allowance(NamedTuple):

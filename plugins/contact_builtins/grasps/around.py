@@ -19,9 +19,9 @@ from typing import ClassVar
 import numpy as np
 
 from contact_builtins.grasps.opposition import Opposition, oppositions
-from contact_core.arrays import FloatArray
+from contact_core.arrays import FloatArray, IntArray
 from contact_core.grasping.features import Features, features_of
-from contact_core.grasping.hand import Hand
+from contact_core.grasping.hand import Hand, spread_out
 from contact_core.grasping.slots import Approaches, GraspRequest, Kind
 from contact_core.settings import HasSettings, setting
 
@@ -34,6 +34,9 @@ TILTS = np.radians([0.0, -20.0, 20.0])
 ROLLS = 8
 SHARES = {"power": 3.0}  # of the approaches, where that of another kind is 1
 WIDEST = {"precision": 0.55, "pinch": 0.25, "lateral": 0.14}  # hand lengths
+PALM_POINTS = 40
+OPPOSITE = 24  # places between whose sides pads are laid
+FITTING = 3  # ways of opposing that are tried at a place
 RELAXED = 0.3  # of its room: how far a digit that takes no part is bent
 
 
@@ -56,9 +59,21 @@ class Around(HasSettings):
         for kind in wanted:
             made = list(makers[kind](hand, found, kind))
             if made:
+                joined = Approaches.joined(made)
+                free = joined[_palm_is_free(request, joined)]
                 share = SHARES.get(kind, 1.0) / sum(SHARES.get(each, 1.0) for each in wanted)
-                parts.append(_thinned(Approaches.joined(made), int(share * self.most), request.seed))
+                parts.append(_thinned(free, int(share * self.most), request.seed))
         return Approaches.joined(parts) if parts else _none(hand)
+
+
+def _palm_is_free(request: GraspRequest, approaches: Approaches) -> IntArray:
+    """Which of those that stay where they are have the palm outside the object; those that move all count."""
+    hand = request.hand
+    stays = ~approaches.ways.any(axis=1)
+    some = hand.tested[spread_out(hand.tested, PALM_POINTS, 0)]
+    points = np.einsum("nij,pj->npi", approaches.placed[:, :3, :3], some) + approaches.placed[:, None, :3, 3]
+    clear = request.field.distances(points.reshape(-1, 3)).reshape(len(points), -1).min(axis=1)
+    return np.flatnonzero(~stays | (clear > -0.005 * hand.length))
 
 
 def _thinned(approaches: Approaches, most: int, seed: int) -> Approaches:
@@ -163,16 +178,17 @@ def _tips(hand: Hand, found: Features, kind: Kind) -> Iterator[Approaches]:
     if not table:
         return
     widest = min(max(one.width for one in table), WIDEST[kind] * hand.length)
-    for row in np.flatnonzero(facing & (found.thickness < 0.95 * widest)):
+    rows = np.flatnonzero(facing & (found.thickness < 0.95 * widest))
+    for row in rows[spread_out(found.points[rows], OPPOSITE, 0)] if len(rows) else rows:
         place = found[np.array([row])]
-        yield _pinched(hand, place, _fitting(table, float(place.thickness[0])), kind)
+        for one in _fitting(table, float(place.thickness[0])):
+            yield _pinched(hand, place, one, kind)
 
 
-def _fitting(table: list[Opposition], thick: float) -> Opposition:
-    """The best opposition of at least a thickness, and not much more."""
-    wide = [one for one in table if one.width >= thick]
-    nearest = min(one.width for one in wide)
-    return min((one for one in wide if one.width <= nearest + 0.3 * thick + 1e-9), key=lambda one: one.misfit)
+def _fitting(table: list[Opposition], thick: float) -> list[Opposition]:
+    """The best oppositions of at least a thickness and not much more, with fingers bent differently far."""
+    wide = [one for one in table if thick <= one.width <= 1.3 * thick + min(each.width for each in table)]
+    return sorted(wide, key=lambda one: one.misfit + max(0.5 * thick - one.room, 0.0) / thick)[:FITTING]
 
 
 def _pinched(hand: Hand, place: Features, one: Opposition, kind: Kind) -> Approaches:

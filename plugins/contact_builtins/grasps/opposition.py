@@ -19,7 +19,8 @@ WIDTHS = 12
 @dataclass(frozen=True, eq=False)
 class Opposition:
     """width: between the pads. middle: (3,) halfway, rig space. towards: (3,) unit, thumb to fingers. digits: those
-    that take part. curl: of the fingers just before they touch. misfit: how badly the pads face each other."""
+    that take part. curl: of the fingers just before they touch. misfit: how badly the pads face each other. room:
+    how far the palm is from the middle."""
 
     width: float
     middle: FloatArray
@@ -27,10 +28,12 @@ class Opposition:
     digits: tuple[int, ...]
     curl: float
     misfit: float
+    room: float
 
 
 def oppositions(hand: Hand, kind: Kind) -> list[Opposition]:
-    """The best by width, from closed to wide open; none for a hand without a thumb or pads."""
+    """The best by width, from closed to wide open, and by how far the fingers are bent; none for a hand without a
+    thumb or pads."""
     if hand.thumb < 0:
         return []
     fingers = _fingers(hand, kind)
@@ -39,7 +42,7 @@ def oppositions(hand: Hand, kind: Kind) -> list[Opposition]:
         for start in range(int(hand.start_counts[hand.thumb]))
         for share in THUMB_CURLS
     ]
-    best: dict[int, Opposition] = {}
+    best: dict[tuple[int, float, bool], Opposition] = {}
     for curl in CURLS:
         if kind == "lateral":
             curl = 0.55
@@ -55,8 +58,10 @@ def oppositions(hand: Hand, kind: Kind) -> list[Opposition]:
             line = gap / max(width, 1e-12)
             misfit = TURNED * ((1.0 - pad[1] @ line) + (1.0 + out @ line))
             digits = (hand.thumb, *fingers)
-            one = Opposition(width, 0.5 * (at + pad[0]), line, digits, 0.75 * curl, float(misfit))
-            place = int(WIDTHS * width / hand.length)
+            middle = 0.5 * (at + pad[0])
+            room = float(np.linalg.norm(hand.tested - middle, axis=1).min())
+            one = Opposition(width, middle, line, digits, 0.75 * curl, float(misfit), room)
+            place = (int(WIDTHS * width / hand.length), curl, room > 0.5 * width)
             if width > 0.01 * hand.length and (place not in best or misfit < best[place].misfit):
                 best[place] = one
     return [one for one in best.values() if one.misfit < 1.6 * TURNED]

@@ -1,0 +1,44 @@
+"""Hollow things filled: what a hand that stays outside a cup has to keep out of, though its wall is thin.
+
+Inside a wall of four millimetres no depth is more than two, so skin that is drawn through it costs next to
+nothing and comes out on the other side. A ball as large as the hand's grip cannot roll into a cup: what it does
+not reach is solid (a morphological closing), and a hand that has not reached into it stays out of all of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from contact_core.geometry.distance_field import DistanceField
+from contact_core.solve.penetration import PenetrationTerm, Solid
+from contact_core.solve.problem import PoseProblem
+
+
+def filled(open_field: DistanceField, radius: float) -> DistanceField:
+    """The signed distance to what a ball of `radius` outside does not reach, negative inside; field units."""
+    margin = int(np.ceil(radius / open_field.spacing)) + 1
+    values = np.pad(open_field.values, margin, mode="edge")
+    outer = np.pad(np.ones(np.array(values.shape) - 2 * margin), margin)
+    beyond = open_field.spacing * distance_transform_edt(outer == 0.0)  # the padding lies so far out
+    reached = values + beyond >= radius
+    away = open_field.spacing * distance_transform_edt(~reached)
+    closed = np.minimum(values + beyond, radius - away)[(slice(margin, -margin),) * 3]
+    return DistanceField(open_field.origin, open_field.spacing, np.where(closed > 0.0, open_field.values, closed))
+
+
+@dataclass(frozen=True, eq=False)
+class KeepOutTerm(PenetrationTerm):
+    """Penetration by fields that are given, by rigid body, in its surface units and space."""
+
+    fields: dict[str, DistanceField] = field(default_factory=dict)
+
+    def solids_in(self, problem: PoseProblem) -> dict[str, Solid]:
+        """The solids of the problem with the given fields."""
+        solids = super().solids_in(problem)
+        for name, given in self.fields.items():
+            size = given.spacing * (np.array(given.values.shape) - 1)
+            solids[name] = replace(solids[name], fields=(given,), low=given.origin, high=given.origin + size)
+        return solids
