@@ -1,8 +1,9 @@
-"""Grasps from two files: `python benchmarks/bench_grasp.py [--count 8] [--hand NAME] [--object NAME] [--sheets DIR]`.
+"""Grasps from two files: `python benchmarks/bench_grasp.py [--count 8] [--hand NAME] [--object NAME] [--sheets
+DIR]`.
 
-Prints, for every hand and object, whether the first grasp passes the verdict, how many of those shown do, and seconds:
-wall clock and processor, for the first and for all. Objects without units are taken in the hand's; a scale is given
-where a file has another size than its object.
+Prints, for every hand and object, whether the first grasp passes the verdict, how many of those shown do, and
+seconds: wall clock and processor, for the first and for all. Objects without units are taken in the hand's; a
+scale is given where a file has another size than its object.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ CONE = 6  # edges of the pyramid in place of a friction cone
 TOUCHES = 0.012  # hand lengths: skin this near touches
 FACES = -0.3  # n.n' of skin that presses on the object
 POINTS = 16  # of contact, for closure
+STRAIGHT = np.radians(40.0)  # all joints of a finger together: less is no bend that holds
 DIRECTIONS = 96
 BACK = (0.06, 0.12, 0.2, 0.3)  # hand lengths of the way back out
 
@@ -109,7 +110,10 @@ def comfort(hand: Hand, angles: FloatArray) -> float:
     share = np.clip((angles - hand.low) / room, 0.0, 1.0)[hand.flexes]
     strain = np.clip(np.abs(2.0 * share - 1.0) - 0.7, 0.0, 0.3) / 0.3
     uneven = uneven_curl(hand, angles, np.ones(len(hand.bones) - 1, bool))
-    return float((1.0 - 0.5 * strain.mean()) * (1.0 - 0.5 * min(uneven / np.pi, 1.0)))
+    total = hand.turned(angles)
+    fingers = [d for d in range(len(total)) if d != hand.thumb]
+    flat = float((total[fingers] < STRAIGHT).mean()) if fingers else 0.0
+    return float((1.0 - 0.5 * strain.mean()) * (1.0 - 0.5 * min(uneven / np.pi, 1.0)) * (1.0 - 0.4 * flat))
 
 
 def clearance(hand: Hand, field: DistanceField, placed: FloatArray, way: FloatArray) -> float:

@@ -11,7 +11,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
 from contact_core.grasping.closing import TOUCH, Closed
-from contact_core.grasping.facts import enclosure
+from contact_core.grasping.facts import STRAIGHT, enclosure
 from contact_core.grasping.hand import Hand, spread_out
 from contact_core.grasping.slots import Approaches
 
@@ -44,7 +44,7 @@ def first_look(hand: Hand, mesh: TriangleMesh, approaches: Approaches, closed: C
     held = np.array([kind in ("power", "hook") for kind in approaches.kinds])
     palm = np.where(held, np.clip((closed.palm / hand.length - 2 * TOUCH) / 0.05, 0.0, 1.0), 0.0)
     value = 1.2 * contact - fit - 0.8 * facing + 0.9 * around - 0.8 * sunk - 0.5 * palm - 0.5 * through
-    value = value - 0.35 * uneven(hand, closed.angles, used)
+    value = value - 0.35 * uneven(hand, closed.angles, used) - 0.4 * straight(hand, closed.angles, used)
     value = value - np.where((around < -0.1) & (np.array(approaches.kinds) != "hook"), 0.3, 0.0)
     if hand.thumb >= 0:  # where it takes part, it shall touch
         value = value - np.where(used[:, hand.thumb] & ~touches[:, hand.thumb], 0.5, 0.0)
@@ -76,6 +76,14 @@ def uneven(hand: Hand, angles: FloatArray, used: BoolArray) -> FloatArray:
     both = used[:, fingers[1:]] & used[:, fingers[:-1]]
     steps = np.where(both, np.abs(np.diff(total[:, fingers], axis=1)), 0.0)
     return np.asarray(steps.max(axis=1, initial=0.0) / (np.pi / 2.0))
+
+
+def straight(hand: Hand, angles: FloatArray, used: BoolArray) -> FloatArray:
+    """(N,) the share of the fingers that take part which are hardly bent: a flat hand laid on a thing holds
+    nothing."""
+    total = np.add.reduceat(np.where(hand.flexes, angles, 0.0), hand.bones[:-1], axis=1)
+    fingers = used & (np.arange(total.shape[1]) != hand.thumb)
+    return np.asarray(((total < STRAIGHT) & fingers).sum(axis=1) / np.maximum(fingers.sum(axis=1), 1))
 
 
 def seen_from(hand: Hand, field: DistanceField, placed: FloatArray) -> FloatArray:

@@ -198,7 +198,8 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
     """Grasps as they come, good ones first as far as a first look tells; those that fail the verdict only where
     there are not enough others. Raises InvalidInput where the hand can come near the object nowhere, Cancelled."""
     progress.tell(0.0, "Looking at the hand and the object")
-    base, pads, proposed = painted_pads(scene)
+    at = None if settings.at is None else np.array(settings.at) * uniform_scale_of(scene)
+    base, pads, proposed = painted_pads(scene, at)
     approaches, closed, value, seen = screened(scene, settings, progress.part(0.02, 0.3))
     order = chosen(scene.hand, approaches, value, seen, MOST_TRIED * settings.count)
     if not len(order):
