@@ -93,5 +93,6 @@ def key_table(table: Iterable[Action]) -> str:
     ordered = sorted(table, key=lambda action: GROUPS.index(action.group))
     for action in ordered:
         keys = ", ".join(f"`{key}`" for key in action.keys)
-        rows.append(f"| {keys} | {action.label} | {action.help} |")
+        by = " (the front end)" if action.by_host else ""
+        rows.append(f"| {keys} | {action.label} | {action.help}{by} |")
     return "\n".join(rows) + "\n"

@@ -197,7 +197,7 @@ class ToolContract(Contract):
         artist, random = artist_with(tool), np.random.default_rng(7)
         for name in DRAGS:
             for button in ("left", "right", "left"):
-                artist.pointer("press", drag(name)[0], button)  # type: ignore[arg-type]
+                artist.pointer("press", drag(name)[0], button)
                 artist.move((1e7, -1e7))
                 artist.hands.advance()
                 artist.move(drag(name)[1])

@@ -131,7 +131,7 @@ class Painting(Gesture):
         self.scene, self.seen = desk.scene, desk.scene.surfaces[hit.surface]
         self.patch = patch or desk.document.free_name("contact")
         self.is_new, self.before = patch is None, desk.selection
-        self.pixels = [pointer.pixel]
+        self.pixels, self.shows = [pointer.pixel], tool.shows
         self.pressure = pointer.pressure
         self.hides = self._screens() if desk.selection.surface is None else ()
         radius = tool.radius_on(desk, hit.surface) / self.seen.scale
@@ -178,7 +178,7 @@ class Painting(Gesture):
 
     def _extend(self, points: SurfacePoints) -> None:
         """Lower the distances round new samples; those that lie beside an earlier one change nothing to the eye."""
-        if self.tool.shows != "area":
+        if self.shows != "area":
             return
         at, new, near = points.positions(self.seen.rest), [], _APART * self.field.radius
         for k in range(len(points)):
@@ -186,7 +186,10 @@ class Painting(Gesture):
             if not len(gaps) or gaps.min() > near:
                 self.sampled = np.concatenate([self.sampled, at[k : k + 1]])
                 new.append(k)
-        self.field = self.field.extended(points[new])
+        try:
+            self.field = self.field.extended(points[new])
+        except InvalidInput:  # a broken surface, whose distances only its proxy has: the line will do
+            self.shows = "line"
 
     def release(self, pointer: Pointer) -> None:
         self.move(pointer)
@@ -229,7 +232,7 @@ class Painting(Gesture):
 
     def overlay(self) -> Overlay:
         color = _ERASED if self.brush.erases else self.color
-        if self.tool.shows == "line":
+        if self.shows == "line":
             return Overlay(axes=(AxisLine(np.stack(self.line), color),))
         field = self.field
         tint = StrokeTint(self.seen.name, field.distances, field.changed, field.radius, color, self.brush.erases)

@@ -1,0 +1,26 @@
+"""Write the table of actions and keys into docs/interaction.md: python .ci/keys.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from contact_core.interaction.actions import actions_of, key_table
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import TOOLS
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "interaction.md"
+BEGIN, END = "<!-- keys -->\n", "<!-- end of keys -->\n"
+
+
+def page_with_table(text: str) -> str:
+    """The page with the table of the tools that come with the product."""
+    import contact_builtins
+
+    tools = PluginManager([contact_builtins], discover=False).offers(TOOLS).values()
+    before, rest = text.split(BEGIN)
+    _, after = rest.split(END)
+    return before + BEGIN + "\n" + key_table(actions_of(tools)) + "\n" + END + after
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page_with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
