@@ -144,7 +144,8 @@ def shortcomings(candidate: object, slot: Slot[Any]) -> list[str]:
             if slot.instances or callable(member):  # a class need not show what its instances will hold
                 result.append(f"has no {name}" + ("()" if callable(member) else ""))
         elif callable(member):
-            result += _call_shortcomings(name, member, getattr(candidate, name), bound=slot.instances)
+            takes_self = slot.instances and not inspect.ismethod(member)
+            result += _call_shortcomings(name, member, getattr(candidate, name), bound=takes_self)
     if not slot.instances and not isinstance(candidate, type):
         result.append("is an object where a class is expected")
     result += declaration_mistakes(candidate)
@@ -169,7 +170,8 @@ def roles_of(candidate: object) -> tuple[str, ...]:
 
 
 def _members(protocol: type) -> dict[str, Any]:
-    """Public members of a protocol by name: its functions, and None for plain attributes and properties."""
+    """Public members of a protocol by name: its functions, its class methods as they are bound to it, and None for
+    plain attributes and properties."""
     result: dict[str, Any] = {}
     for base in reversed(protocol.__mro__):
         if not getattr(base, "_is_protocol", False):
@@ -178,7 +180,8 @@ def _members(protocol: type) -> dict[str, Any]:
             result.setdefault(name, None)
         for name, member in vars(base).items():
             if not name.startswith("_"):
-                result[name] = member if inspect.isfunction(member) else None
+                bound = getattr(protocol, name) if isinstance(member, classmethod) else None
+                result[name] = member if inspect.isfunction(member) else bound
     return {name: member for name, member in result.items() if not name.startswith("_")}
 
 

@@ -161,6 +161,17 @@ BROKEN = {
         OFFER + "Mine.replaces = 5\n@hookimpl\ndef contact_placers(): return [Mine]\n",
         "its placer 'Mine' cannot be made: TypeError",
     ),
+    "host_that_opens_nothing": (
+        OFFER + "class Host:\n    name = 'h'\n    summary = 's'\n    suffixes = ()\n    def space(self): ...\n"
+        "@hookimpl\ndef contact_hosts(): return [Host]\n",
+        "has no open()",
+    ),
+    "host_that_opens_no_path": (
+        OFFER + "class Host:\n    name = 'h'\n    summary = 's'\n    suffixes = ()\n    def space(self): ...\n"
+        "    @classmethod\n    def open(cls): ...\n"
+        "@hookimpl\ndef contact_hosts(): return [Host]\n",
+        "open() cannot be called as open(path)",
+    ),
     "host_object": (
         OFFER + "class Host:\n    name = 'h'\n    def space(self): ...\n"
         "@hookimpl\ndef contact_hosts(): return [Host()]\n",
