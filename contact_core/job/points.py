@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from contact_core.arrays import IntArray
 from contact_core.contact.point_sets import geodesic_disk
 from contact_core.document.asset import Asset
+from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.errors import InvalidInput
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.geometry.tangent import direction_to_heading
 from contact_core.job.recipe import PatchSpec, PointSpec, RootSpec
 from contact_core.rig.bones import skin_point
 
 _UPRIGHT = 0.05  # sine of the angle to the normal below which a direction tells no heading
 
 
-def painted_points(spec: PatchSpec, asset: Asset) -> SurfacePoints:
-    """The points of a patch on a manipulator's surface. Raises InvalidInput naming the patch."""
+def painted_points(spec: PatchSpec, asset: Asset, surface: str, geometry: DocumentGeometry) -> SurfacePoints:
+    """The points of a patch on a manipulator's surface, whose mesh is the asset's. Raises InvalidInput naming the
+    patch, NotManifold where a disk needs a proxy."""
     try:
         if spec.disk is not None:
             reach = asset.mesh.bounding_box_diagonal
@@ -27,7 +30,9 @@ def painted_points(spec: PatchSpec, asset: Asset) -> SurfacePoints:
                 raise InvalidInput(
                     f"its radius is {spec.disk.radius:g}, but {asset.name} is only {reach:.3g} units across."
                 )
-            return geodesic_disk(asset.mesh, surface_point(spec.disk.at, asset), spec.disk.radius, spec.disk.count)
+            centre = geometry.on_carrier(surface, surface_point(spec.disk.at, asset))
+            disk = geodesic_disk(geometry.carrier(surface), centre, spec.disk.radius, spec.disk.count)
+            return geometry.seen(surface, disk)
         if spec.vertices:
             return SurfacePoints.at_vertices(asset.mesh, _mesh_vertices(asset, np.array(spec.vertices)))
         return Locator.of(asset.mesh).closest(np.array(spec.positions)).points
@@ -42,8 +47,9 @@ def axis_points(spec: PatchSpec, asset: Asset) -> SurfacePoints | None:
     return SurfacePoints.concatenate([surface_point(point, asset) for point in spec.axis])
 
 
-def target_root(spec: RootSpec, asset: Asset) -> tuple[SurfacePoints, complex]:
-    """The root (one point) that a recipe gives a patch on the object, and the heading of its axis there."""
+def target_root(spec: RootSpec, asset: Asset) -> tuple[SurfacePoints, dict[str, Any]]:
+    """The root (one point) that a recipe gives a patch on the object, and its heading or direction there, as verbs
+    take them."""
     root = surface_point(spec.root, asset)
     if spec.aim is None:
         direction = np.array([spec.direction])
@@ -52,11 +58,11 @@ def target_root(spec: RootSpec, asset: Asset) -> tuple[SurfacePoints, complex]:
             raise InvalidInput(
                 "the direction of a patch stands upright on the object at its root; give one along it."
             )
-        return root, complex(direction_to_heading(asset.mesh, root, direction)[0])
+        return root, {"direction": direction[0]}
     log = log_map(asset.mesh, root, surface_point(spec.aim, asset))
     if log.anchor[0] < 0 or not log.distance[0] > 0:
         raise InvalidInput("the point that a patch aims at must be another point on the same part of the object.")
-    return root, complex(log.coordinates[0]) / float(log.distance[0])
+    return root, {"heading": complex(log.coordinates[0]) / float(log.distance[0])}
 
 
 def surface_point(spec: PointSpec, asset: Asset) -> SurfacePoints:

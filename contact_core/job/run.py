@@ -16,7 +16,7 @@ import numpy as np
 
 from contact_core.atomic_set import check_writable
 from contact_core.document.asset import Asset
-from contact_core.errors import Cancelled, InvalidInput
+from contact_core.errors import Cancelled, InvalidInput, NotManifold
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.job.inputs import object_mesh, read_source, solids_of
 from contact_core.job.job import Job, JobResult
@@ -93,6 +93,7 @@ def prepare(recipe: Recipe, plugins: PluginManager, *, progress: Progress = NO_P
     with job.stage("transfer", 0.3, "Placing the contacts on the object"):
         _place(job)
         _start(job)
+    job.notes += job.session.notes  # on surfaces that got proxies
     return job
 
 
@@ -134,7 +135,7 @@ def _read(job: Job) -> None:
 def _paint(job: Job, spec: PatchSpec) -> None:
     surface, _ = job.touches(spec)
     asset, plugins = job.assets[surface], job.session.plugins
-    points = painted_points(spec, asset)
+    points = _points(job, spec, asset, surface)
     try:
         name = plugins.name_for(AXIS_GENERATORS, "recipe", spec.generator)
         generator = plugins.make(AXIS_GENERATORS, name, **spec.generator_options)
@@ -142,6 +143,18 @@ def _paint(job: Job, spec: PatchSpec) -> None:
         job.session.patches.paint(spec.name, points, surface=surface, axis=axis, generator=generator)
     except InvalidInput as error:
         raise type(error)(f"the axis of patch {spec.name!r}: {error}") from error
+
+
+def _points(job: Job, spec: PatchSpec, asset: Asset, surface: str) -> SurfacePoints:
+    """The points of a patch; where the manipulator's surface is too broken for a disk, it gets a proxy."""
+    session = job.session
+    try:
+        return painted_points(spec, asset, surface, session.geometry)
+    except NotManifold:
+        if not session.makers.mends or session.document.surface(surface).proxy is not None:
+            raise
+        session.surfaces.add_proxy(surface)
+        return painted_points(spec, asset, surface, session.geometry)
 
 
 def _place(job: Job) -> None:
@@ -159,8 +172,8 @@ def _place(job: Job) -> None:
                 job.start[hand] = found.pose
         for spec in specs:
             if spec.place is not None:
-                point, heading = target_root(spec.place, job.assets[thing])
-                _transfer(job, spec.name, thing, point, heading=heading)
+                point, way = target_root(spec.place, job.assets[thing])
+                _transfer(job, spec.name, thing, point, **way)
     if not session.document.pairs:
         reasons = "; ".join(f"{name}: {why}" for name, why in job.left_out.items())
         raise InvalidInput(f"the hand is not near the object, no contact found a place ({reasons}).")

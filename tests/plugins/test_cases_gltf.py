@@ -409,3 +409,52 @@ def test_python_does_not_speak(tmp_path: Path) -> None:
         with pytest.raises(FileRefused) as refused:
             read(tmp_path / "m.gltf")
         assert not any(word in str(refused.value) for word in ("recursion", "embedded", "null byte", "Error"))
+
+
+def squeezed(packed: dict[str, bytes], count: dict[str, int]) -> dict[str, Any]:
+    """A document as gltfpack writes it: views of a buffer without bytes, compressed in that of the file."""
+    views, start = [], 0
+    for mode, stride in (("ATTRIBUTES", 12), ("TRIANGLES", 2)):
+        told = {"buffer": 0, "byteOffset": start, "byteLength": len(packed[mode]), "byteStride": stride,
+                "mode": mode, "count": count[mode]}  # fmt: skip
+        views.append({"buffer": 1, "byteLength": 12, "extensions": {"EXT_meshopt_compression": told}})
+        start += len(packed[mode])
+    return {
+        "asset": {"version": "2.0"},
+        "extensionsRequired": ["EXT_meshopt_compression"],
+        "buffers": [
+            {"byteLength": start},
+            {"byteLength": 1 << 20, "extensions": {"EXT_meshopt_compression": {"fallback": True}}},
+        ],
+        "bufferViews": views,
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": count["ATTRIBUTES"], "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": count["TRIANGLES"], "type": "SCALAR"},
+        ],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "nodes": [{"mesh": 0}],
+    }
+
+
+def test_meshopt_is_read(tmp_path: Path) -> None:
+    meshopt = pytest.importorskip("meshopt")
+    ball, path = meshes.icosphere(2), tmp_path / "m.glb"
+    points, faces = ball.points.astype("<f4"), ball.faces.astype("<u2")
+    packed = {
+        "ATTRIBUTES": meshopt.encode_gltf_buffer(points, "ATTRIBUTES"),
+        "TRIANGLES": meshopt.encode_gltf_buffer(faces.ravel(), "TRIANGLES"),
+    }
+    count = {"ATTRIBUTES": len(points), "TRIANGLES": faces.size}
+    binary = b"".join(packed.values())
+    mesh = read(save(path, squeezed(packed, count), binary)).mesh
+    assert len(mesh.points) == len(points) and np.isclose(volume(mesh), volume(ball), rtol=1e-6)
+    assert np.abs(np.linalg.norm(mesh.points, axis=1) - 1.0).max() < 1e-6
+    with pytest.raises(FileRefused, match="meshopt data cannot be decoded"):
+        read(save(path, squeezed(packed, count), b"\0" * len(binary)))
+    many = squeezed(packed, count)
+    many["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["count"] = 1 << 40
+    with pytest.raises(FileRefused, match="compressed elements"):
+        read(save(path, many, binary))
+    beyond = {**packed, "TRIANGLES": packed["TRIANGLES"] + b"more"}
+    with pytest.raises(FileRefused, match="ends at byte"):
+        read(save(path, squeezed(beyond, count) | {"buffers": squeezed(packed, count)["buffers"]}, binary))

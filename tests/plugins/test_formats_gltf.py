@@ -217,7 +217,6 @@ def test_joint_names_become_unique(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"extensionsRequired": ["EXT_meshopt_compression"]}, "meshopt"),
         ({"extensionsRequired": ["ACME_secret"]}, "ACME_secret"),
         ({"asset": {"version": "1.0"}}, "version 1.0"),
         ({"meshes": []}, "meshes"),

@@ -23,6 +23,8 @@ from contact_core.geometry.report import report
 from contact_core.geometry.surface_map import SurfaceMap
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
+from contact_core.job.recipe_reader import load_recipe
+from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.proxies import made_proxy
 from contact_core.plugins.registry import PROXY_MAKERS
@@ -335,6 +337,32 @@ def test_contacts_do_not_slide_on_a_proxy_but_say_so() -> None:
         goal = problem.contacts[0].object_points
         assert goal.same_as(session.geometry.points("goal")) and goal.faces.max() < len(mesh.faces)
         assert "proxy" in session.slide().left_out["tip - goal"]
+
+
+def test_a_recipe_places_a_contact_on_a_broken_object(tmp_path: Path) -> None:
+    mesh = broken("fin")
+    lines = [f"v {x} {y} {z}" for x, y, z in 0.05 * mesh.points]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces]
+    (tmp_path / "fin.obj").write_text("\n".join(lines))
+    beside = (0.05 * 0.75 * at_the_fin(mesh)).tolist()
+    (tmp_path / "fin.toml").write_text(f"""
+schema = 1
+name = "fin"
+title = "A tip beside a fin"
+[manipulator]
+sample = "human_hand"
+[object]
+file = "fin.obj"
+center = [0.0, 0.07, 0.08]
+[[patch]]
+name = "tip"
+disk = {{ joint = "index_distal", along = 0.55, radius = 0.0065, points = 30 }}
+place = {{ root = {{ position = {beside} }}, direction = [0.3, 1.0, 0.2] }}
+""")
+    job = prepare(load_recipe(tmp_path / "fin.toml"), PluginManager())
+    assert job.session.document.surface("object").proxy is not None
+    assert any("proxy" in note for note in job.notes)
+    assert len(job.session.geometry.pairs()[0].object_points) == 30
 
 
 # --- skins ------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from urllib.parse import unquote
 import numpy as np
 import numpy.typing as npt
 
+from contact_builtins.formats import gltf_meshopt
 from contact_builtins.formats.refusal import bounded, file_bytes
 from contact_core.errors import FileRefused, InvalidInput
 
@@ -38,7 +39,7 @@ HARMLESS = (
     "CESIUM_primitive_outline", "AGI_", "ASOBO_", "BLENDER_", "FB_ngon_encoding", "GODOT_", "MOZ_", "NEEDLE_",
     "MX_", "OMI_", "VRM",
 )  # fmt: skip
-UNDERSTOOD = ("KHR_mesh_quantization", "KHR_draco_mesh_compression")
+UNDERSTOOD = ("KHR_mesh_quantization", "KHR_draco_mesh_compression", *gltf_meshopt.NAMES)
 _OLD = (
     "{path} is glTF version {version}, an old format that is laid out otherwise; version 2 is read. Convert it"
     " (gltf-pipeline does) or export it anew as glTF 2.0."
@@ -108,13 +109,32 @@ class Gltf:
         squeezed = any(name in COMPRESSED for name in entry.get("extensions", {}))
         empty = any(name in COMPRESSED for name in buffer.get("extensions", {})) or not self.binary
         if squeezed and empty and "uri" not in buffer:
-            raise FileRefused(_compressed(self.path, entry["extensions"]))
+            return self._unsqueezed(index, entry)
         data = self._buffers[entry["buffer"]]
         start = bounded_offset(entry.get("byteOffset", 0))
         end = start + bounded_offset(entry["byteLength"])
         if end > len(data):
             raise InvalidInput(f"bufferViews[{index}] ends at byte {end} of {len(data)}")
         return data, start, end, bounded_offset(entry.get("byteStride", 0))
+
+    def _unsqueezed(self, index: int, entry: dict[str, Any]) -> tuple[bytes, int, int, int]:
+        """A compressed view without a twin. Raises FileRefused where nothing here reads it."""
+        told = next((entry["extensions"][name] for name in gltf_meshopt.NAMES if name in entry["extensions"]), None)
+        if told is None:
+            raise FileRefused(_compressed(self.path, entry["extensions"]))
+        if index not in self._decoded:
+            data = self._buffers[told["buffer"]]
+            start = bounded_offset(told.get("byteOffset", 0))
+            end = start + bounded_offset(told["byteLength"])
+            if end > len(data):
+                raise InvalidInput(f"bufferViews[{index}] ends at byte {end} of {len(data)}")
+            self._decoded[index] = gltf_meshopt.decoded(told, data[start:end], self.path)
+        found = self._decoded[index]
+        return found, 0, len(found), bounded_offset(entry.get("byteStride", 0))
+
+    @cached_property
+    def _decoded(self) -> dict[int, bytes]:
+        return {}
 
     def accessor(self, index: Any) -> npt.NDArray[Any]:
         """(count, width) values of an accessor, as stored; normalised integers as floats."""
@@ -176,8 +196,6 @@ def open_gltf(path: Path) -> Gltf:
             raise FileRefused(_OLD.format(path=path, version=version))
         raise FileRefused(f"{path} is glTF version {version or 'unknown'}; version 2 is read. Export it anew.")
     required = document.get("extensionsRequired", [])
-    if any(COMPRESSED.get(name) == "meshopt" for name in required):
-        raise FileRefused(_compressed(path, required))
     for name in required:
         if name not in UNDERSTOOD and not str(name).startswith(HARMLESS):
             raise FileRefused(

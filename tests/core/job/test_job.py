@@ -369,8 +369,9 @@ def test_a_hull_holds_all_points_and_looks_outwards() -> None:
 
 def test_a_patch_by_file_vertices_uses_the_files_own_numbers() -> None:
     spec = PatchSpec("a", vertices=(5, 9))
-    asset = demo("alien").assets[HAND]
-    points = painted_points(spec, asset).positions(asset.mesh)
+    job = demo("alien")
+    asset = job.assets[HAND]
+    points = painted_points(spec, asset, HAND, job.session.geometry).positions(asset.mesh)
     vertices = np.array([5, 9]) if asset.source_vertices is None else asset.source_vertices[[5, 9]]
     np.testing.assert_allclose(points, asset.mesh.points[vertices])
 
