@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from contact_core.arrays import FloatArray, frozen
 from contact_core.contact.area import PatchArea, measure_area
 from contact_core.contact.axis import Axis
 from contact_core.contact.axis_generator import AxisRequest
+from contact_core.contact.crowding import crowded_points
 from contact_core.contact.distortion import Distortion, measure_distortion
 from contact_core.contact.pairing import correspond
 from contact_core.contact.patch import PatchPoints
@@ -23,6 +24,7 @@ from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.bones import bones_of
 from contact_core.rig.poses import posed_points
 from contact_core.rig.rig import Rig
@@ -219,6 +221,38 @@ class DocumentGeometry:
             points_there.normals(mesh_there),
             mirrored=here.mirrored != there.mirrored,
         )
+
+    def crowded(self, copies: Iterable[str]) -> dict[str, float]:
+        """By copy, the share of its points that lie on a part of these copies which is elsewhere where they come
+        from (`contact.crowding`). Copies whose original is gone, or not loaded, are left out."""
+        chosen: list[str] = []
+        here: list[FloatArray] = []
+        there: list[FloatArray] = []
+        for name in copies:
+            original = self._original_of(name)
+            if original is not None:
+                chosen.append(name)
+                here.append(self._in_world(original))
+                there.append(self._in_world(name))
+        if not chosen:
+            return {}
+        found = crowded_points(np.concatenate(here), np.concatenate(there))
+        parts = np.split(found, np.cumsum([len(part) for part in there])[:-1])
+        return {name: float(part.mean()) for name, part in zip(chosen, parts, strict=True)}
+
+    def _original_of(self, patch: str) -> str | None:
+        """The patch that a copy was made of, where its mesh is loaded."""
+        for name in self.document.partners(patch):
+            other = self.document.patch(name)
+            if other.original and other.surface in self._derived.meshes(self.document):
+                return name
+        return None
+
+    def _in_world(self, patch: str) -> FloatArray:
+        """(n, 3) points of a patch at rest where its surface stands, in metres."""
+        surface = self.document.surface(self.document.patch(patch).surface)
+        at = self.points(patch).positions(self.mesh_of(patch))
+        return surface.meters_per_unit * transform_points(surface.world_from_surface, at)
 
     # -- pairs ---------------------------------------------------------------------------------------------------
 

@@ -111,6 +111,7 @@ class GatheringVerbs(PaintingVerbs):
             copies.append(replace(copy, mirrored=patch.mirrored != mirrored))
         copied = Group(name or document.free_name(f"{group}.{onto[0]}", document.groups), tuple(names.values()))
         self._editor.do(Macro(f"Transfer {group}", (Transfer(tuple(copies)), copied)))
+        self._warn_where_crowded(names.values())
         return names
 
     def _frame(self, surface: str, root: Root) -> _Frame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, Self, TypeVar
@@ -23,7 +24,11 @@ from contact_core.errors import InvalidInput, MissingExtra, NotManifold, Unreach
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
 
+log = logging.getLogger(__name__)
+
 T = TypeVar("T")
+CROWDED = 0.02  # share of a copy's points: fewer may meet at a seam
+_CURE = "Transfer them part by part, to places of their own, or scale them down."
 
 
 class VerbGroup:
@@ -90,6 +95,15 @@ class VerbGroup:
             unit=self._geometry.unit(patch),
             engine=self._editor.derived.engine,
         )
+
+    def _warn_where_crowded(self, copies: Iterable[str]) -> None:
+        """Say in the log where parts of what was transferred lie on one another. A stroke previews from its start,
+        where the copies are not, so a drag is not commented on frame by frame."""
+        there = [name for name in copies if name in self._document.patches]
+        shares = {name: share for name, share in self._geometry.crowded(there).items() if share > CROWDED}
+        if shares:
+            told = ", ".join(f"{name!r} ({100.0 * share:.0f} % of its points)" for name, share in shares.items())
+            log.warning("parts that were apart lie on one another now: %s. %s", told, _CURE)
 
     def _check_axis_point(self, patch: str, point: int) -> None:
         """A patch has this axis point. Raises InvalidInput."""

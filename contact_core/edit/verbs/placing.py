@@ -141,7 +141,11 @@ class PlacingVerbs(VerbGroup):
         mirrored: bool = True,
         descendants: bool = True,
     ) -> dict[str, str]:
-        """Copy a patch and all its descendants, in one go; returns the copies' names by the names copied."""
+        """Copy a patch and all its descendants, in one go; returns the copies' names by the names copied.
+
+        Where parts that were apart land on one another, a warning in the log says which
+        (`geometry.crowded` measures it).
+        """
 
         def act(verbs: PlacingVerbs) -> dict[str, str]:
             root = verbs._geometry.root_at(surface, point, heading, direction)
@@ -175,6 +179,7 @@ class PlacingVerbs(VerbGroup):
             )
         copied = [copy.name for copy in copies.values()]
         self._do_where_it_can_walk(Transfer(tuple(copies.values())), copied)
+        self._warn_where_crowded(copied)
         return {name: copy.name for name, copy in copies.items()}
 
     def symmetric_copy(

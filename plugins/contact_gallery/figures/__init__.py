@@ -22,4 +22,5 @@ ORDER = (
     "contact_models",
     "posing_methods",
     "failures",
+    "crowding",
 )

@@ -8,15 +8,24 @@ from importlib.resources import files
 
 import numpy as np
 
+import contact_core as contact
 from contact_builtins.demos import demo_recipe
+from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
 from contact_core.job.recipe import Recipe
 from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import perform
-from contact_gallery.looks import LOOKS, SKIN, view
+from contact_core.scene.picture import Picture
+from contact_gallery.looks import LOOKS, SKIN, deepest, view
 from contact_gallery.sheet import Sheet
 
 PAPER = "Figures 1, 6 and 8"
+Vector = tuple[float, float, float]
+WRAPS: tuple[tuple[str, int, Vector, Vector, Vector], ...] = (
+    ("pole", 5, (0.05, 0.3, 0.0), (0.0, 0.4, 1.0), (1.0, 0.3, 0.7)),
+    ("mug", 9, (0.03, 0.03, 0.05), (-1.0, 0.1, 0.3), (0.2, 0.5, 1.0)),
+    ("baseball", 11, (0.0, 0.0, 0.05), (-1.0, 0.25, 0.0), (0.3, 0.4, 1.0)),
+)
 ROWS = (("mug", "baseball", "pole"), ("witch", "witch_pole", "witch_ball"), ("alien", "alien_ball", "alien_mug"))
 
 
@@ -54,6 +63,31 @@ def draw(sheet: Sheet) -> None:
             judged = "a grasp" if job.verdict.is_grasp else job.verdict.failures[0]
             sheet.measure(recipe.title, f"{told}; {judged}")
         sheet.show(*pictures, aspect=1.2)
+    sheet.show(*(wrapped(sheet, *wrap) for wrap in WRAPS), aspect=1.2)
+
+
+def wrapped(sheet: Sheet, thing: str, first: int, start: Vector, way: Vector, camera: Vector) -> Picture:
+    """The tentacle round an object: a strip along its flat side from joint `first`, one transfer, one solve."""
+    with contact.new(tentacle="sample:tentacle", thing=f"sample:{thing}", plugins=sheet.plugins) as session:
+        rig, skin = session.rigs["tentacle"], session.geometry.mesh("tentacle")
+        along = Locator.of(skin).closest(rig.rest_world[first:20, :3, 3] + np.array([0.0, 0.0, 0.05])).points
+        widths = np.linspace(0.014, 0.004, 14)[first - 5 :]
+        strokes = [
+            contact.BrushGesture(skin, along[k : k + 2], radius=w, spacing=0.35 * w) for k, w in enumerate(widths)
+        ]
+        with sheet.counting(session):
+            session.patches.brush("disk", "strip", *strokes, surface="tentacle", axis=along)
+            root = Locator.of(session.geometry.mesh("thing")).closest([start]).points
+            copy = session.patches.transfer("strip", "thing", root, direction=way)
+            session.patches.scale(copy, along=0.8)  # the inner side of a bend is shorter than the skin at rest
+            session.pairs.add("strip", copy, name="strip")
+            proposal = session.solve(solver="progressive", terms=["penetration"])
+            session.accept(proposal)
+        apart, deep = proposal.after.patches["strip"].mean / 0.006, deepest(session, "tentacle", "thing") / 0.006
+        told = f"contacts {apart:.1f} % of its length apart, skin {deep:.1f} % deep, {proposal.after.seconds:.2f} s"
+        sheet.measure(f"The tentacle takes a {thing}", told)
+        near = session.geometry.posed_mesh("tentacle").points
+        return view(session, camera_from=camera, caption=f"The tentacle takes a {thing}", focus=near, axes=False)
 
 
 def recipe_of(name: str) -> Recipe:
