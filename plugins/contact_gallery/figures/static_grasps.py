@@ -23,8 +23,8 @@ PAPER = "Figures 1, 6 and 8"
 Vector = tuple[float, float, float]
 WRAPS: tuple[tuple[str, int, Vector, Vector, Vector], ...] = (
     ("pole", 5, (0.05, 0.3, 0.0), (0.0, 0.4, 1.0), (1.0, 0.3, 0.7)),
-    ("mug", 9, (0.03, 0.03, 0.05), (-1.0, 0.1, 0.3), (0.2, 0.5, 1.0)),
-    ("baseball", 11, (0.0, 0.0, 0.05), (-1.0, 0.25, 0.0), (0.3, 0.4, 1.0)),
+    ("mug", 10, (0.03, 0.03, 0.05), (-1.0, 0.1, 0.3), (0.2, 0.5, 1.0)),
+    ("baseball", 12, (0.0, 0.0, 0.05), (-1.0, 0.3, 0.0), (0.3, 0.4, 1.0)),
 )
 ROWS = (("mug", "baseball", "pole"), ("witch", "witch_pole", "witch_ball"), ("alien", "alien_ball", "alien_mug"))
 
