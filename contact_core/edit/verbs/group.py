@@ -100,7 +100,11 @@ class VerbGroup:
         """Say in the log where parts of what was transferred lie on one another. A stroke previews from its start,
         where the copies are not, so a drag is not commented on frame by frame."""
         there = [name for name in copies if name in self._document.patches]
-        shares = {name: share for name, share in self._geometry.crowded(there).items() if share > CROWDED}
+        try:
+            found = self._geometry.crowded(there)
+        except InvalidInput:  # it is committed: what cannot be looked at is not commented on
+            return
+        shares = {name: share for name, share in found.items() if share > CROWDED}
         if shares:
             told = ", ".join(f"{name!r} ({100.0 * share:.0f} % of its points)" for name, share in shares.items())
             log.warning("parts that were apart lie on one another now: %s. %s", told, _CURE)

@@ -158,6 +158,7 @@ CASES: list[tuple[str, Callable[[Session], object]]] = [
     ("set_extra", lambda s: s.set_extra("", 1)),
     ("geometry.area", lambda s: s.geometry.area("nobody")),
     ("geometry.distortion", lambda s: s.geometry.distortion("palm", "thumb")),
+    ("geometry.crowded", lambda s: s.geometry.crowded(["nobody"])),
     ("geometry.touching", lambda s: s.geometry.touching("torus", "sphere", NAN)),
     ("patches.paint_touching", lambda s: s.patches.paint_touching("new", "torus", "sphere", 1e-9)),
     ("patches.transfer_group", lambda s: s.patches.transfer_group("nothing", ["sphere"], HERE, heading=1.0)),
