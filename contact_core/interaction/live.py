@@ -226,4 +226,5 @@ def _bodies(pins: tuple[Any, ...]) -> tuple[str, ...]:
 
 
 def _same(first: tuple[object, ...], second: tuple[object, ...]) -> bool:
-    return len(first) == len(second) and all(a is b for a, b in zip(first, second, strict=True))
+    """Whether two lists hold the same objects, or values that are equal (patches, pairs, pins)."""
+    return len(first) == len(second) and all(a is b or a == b for a, b in zip(first, second, strict=True))
