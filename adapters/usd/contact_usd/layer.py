@@ -120,9 +120,9 @@ class LayerUndo:
         It is part of the step that is open, else a step, and costs what the attributes do, not what the layer does.
         """
         with self.step(label) if self._depth == 0 else contextlib.nullcontext():
-            before = {path: Attribute.read(self._layer, path) for path in paths}
+            before, heard = {path: Attribute.read(self._layer, path) for path in paths}, self._heard
             yield
-            self._heard = max(self._heard - 1, 0)  # that change; somebody who answered it with another is heard
+            self._heard -= self._heard > heard  # that change; somebody who answered it with another is heard
             self._written = before | self._written
 
     def go(self, by: int) -> bool:

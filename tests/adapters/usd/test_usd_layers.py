@@ -96,6 +96,46 @@ def test_what_a_layer_below_published_does_not_come_back(tmp_path: Path) -> None
     assert len(contacts.read_pairs(host.stage)) == 1
 
 
+def test_edits_of_the_document_and_of_others_share_a_step() -> None:
+    """In whichever order they come; also where somebody answers our edit with his own, or ours changes nothing."""
+    host, session, key = torus_host()
+    prim = host.stage.GetPrimAtPath(key)
+
+    def move(x: float) -> None:
+        with Usd.EditContext(host.stage, host.layer):
+            UsdGeom.Xformable(prim).MakeMatrixXform().Set(Gf.Matrix4d(1.0).SetTranslate((x, 0.0, 0.0)))
+
+    def answer(notice: Usd.Notice.ObjectsChanged, stage: Usd.Stage) -> None:
+        if any(path.name == "contact:digest" for path in notice.GetChangedInfoOnlyPaths()):
+            move(7.0)
+
+    def answered() -> None:
+        listener = Tf.Notice.Register(Usd.Notice.ObjectsChanged, answer, host.stage)
+        session.set_extra("answered", 1)
+        listener.Revoke()
+
+    def nothing_new() -> None:
+        with host.step("both"):
+            move(5.0)
+            host.store_document(host.stored_stamp(), {})  # type: ignore[arg-type]
+
+    def both() -> None:
+        with host.step("both"):
+            session.set_extra("first", 1)
+            move(2.0)
+            session.set_extra("second", 1)
+
+    texts = [host.layer.ExportToString()]
+    for edit in (both, lambda: session.set_extra("alone", 1), nothing_new, answered):
+        edit()
+        texts.append(host.layer.ExportToString())
+        assert texts[-1] != texts[-2]
+    for text in texts[-2::-1]:
+        assert host.undo() and host.layer.ExportToString() == text
+    for text in texts[1:]:
+        assert host.redo() and host.layer.ExportToString() == text
+
+
 def test_publishing_writes_what_changed_and_nothing_else() -> None:
     """Prims whose patch, surface, pose and place are the same are not touched; those of other names go."""
     host, session, key = torus_host()
