@@ -133,20 +133,18 @@ def sitting_down() -> tuple[dict[str, Any], MotionSolution]:
     }, solution
 
 
-def repairing(truth: MotionSolution) -> dict[str, Any]:
+def repairing(seated: MotionSolution) -> dict[str, Any]:
     """Skate put into a clip, and taken out again."""
-    motion, clip = skating(truth)
+    motion, clip, truth = skating(seated)
     solution, ms = timed(motion, start=clip)
-    before, after, true = (
-        motion_report(motion, thetas, solids={}) for thetas in (clip, solution.thetas, truth.thetas)
-    )
+    before, after, true = (motion_report(motion, thetas, solids={}) for thetas in (clip, solution.thetas, truth))
     skates = [max(pair.skate_max for pair in r.pairs.values()) / RATE for r in (before, after, true)]
     rms = [max(pair.skate_rms for pair in r.pairs.values()) / RATE for r in (before, after)]
     rig = motion.problems[0].bodies[0].rig
 
     def off(thetas: FloatArray) -> float:
         distances = []
-        for problem, one, two in zip(motion.problems, thetas, truth.thetas, strict=True):
+        for problem, one, two in zip(motion.problems, thetas, truth, strict=True):
             both = (skin(rig, problem.state(theta).motions[0].world) for theta in (one, two))
             distances.append(np.linalg.norm(np.subtract(*both), axis=1).mean())
         return MM * float(np.mean(distances))

@@ -12,13 +12,14 @@ from pose_scenes import chair
 from contact_core.arrays import FloatArray
 from contact_core.geometry.raycast import Locator
 from contact_core.motion.problem import MotionProblem, MotionWeights
-from contact_core.motion.solving import MotionSolution
+from contact_core.motion.solving import MotionSolution, solve_motion
 from contact_core.rig.rig import Pose
 from contact_core.rig.rotations import exponential
 from contact_core.solve.body import PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import PenetrationTerm
 from contact_core.solve.problem import PoseProblem
+from contact_core.solve.state import PoseState
 from contact_core.solve.terms import DistanceTerm, paper_terms
 
 RATE = 24.0
@@ -152,35 +153,45 @@ def sitting(seconds: float = 5.0, heels: float = 0.3) -> MotionProblem:
     )  # fmt: skip
 
 
-def _in_place(contact: PairedPoints, scene: PoseProblem) -> PairedPoints:
-    """A contact of soles with the floor right below where they stand at the start."""
-    points = scene.start_state.vectors(scene.pairs.manipulator_points)[scene.pairs.rows[contact.name]]
+def _in_place(contact: PairedPoints, scene: PoseProblem, state: PoseState | None = None) -> PairedPoints:
+    """A contact of soles with the floor right below where they stand in a state, by default at the start."""
+    state = state or scene.start_state
+    points = state.vectors(scene.pairs.manipulator_points)[scene.pairs.rows[contact.name]]
     floor = scene.bodies[scene.body_index(contact.object)]
     into = np.linalg.inv(floor.world_from_rig)
     below = Locator.of(floor.rig.surface).closest(points @ into[:3, :3].T + into[:3, 3])
     return replace(contact, object_points=below.points)
 
 
-def skating(truth: MotionSolution) -> tuple[MotionProblem, FloatArray]:
-    """A clip made of a true motion by putting skate in, and the motion problem that repairs it.
+def skating(seated: MotionSolution) -> tuple[MotionProblem, FloatArray, FloatArray]:
+    """A clip made of a true motion by putting skate in, the motion problem that repairs it, and the true thetas.
 
-    The whole body wanders over the floor by centimetres, at 0.3 to 1.5 Hz, and takes its feet along. What the
-    repair knows is the clip, and where the soles belong.
+    The truth is that of who sits down, but with soles that stay: they crept by 2 mm, which nobody can know of a
+    clip. The whole body then wanders over the floor by centimetres, at 0.3 to 1.5 Hz, and takes its feet along.
+    What the repair knows is the clip, and where the soles belong.
     """
-    motion, random = truth.motion, np.random.default_rng(6)
+    motion, random = seated.motion, np.random.default_rng(6)
     problem, seconds = motion.problems[0], motion.clock.seconds
-    wander = np.zeros_like(truth.thetas)
+    truth = solve_motion(_repair(seated, seated.thetas), start=seated.thetas).thetas
+    wander = np.zeros_like(truth)
     for frequency in (0.3, 0.7, 1.5):
         phase = random.uniform(0.0, 2.0 * np.pi, wander.shape[1])
         size = np.where(problem.is_root & problem.is_translation, 0.01, 0.0)
         wander += size * np.sin(2.0 * np.pi * frequency * seconds[:, None] + phase)
-    clip = np.array([np.clip(theta, *problem.limits_of_theta) for theta in truth.thetas + wander])
-    body = problem.bodies[0].name
+    clip = np.array([np.clip(theta, *problem.limits_of_theta) for theta in truth + wander])
+    return _repair(seated, clip), clip, truth
+
+
+def _repair(seated: MotionSolution, clip: FloatArray) -> MotionProblem:
+    """What keeps to a clip (n, d), with soles that stay where they belong."""
+    motion = seated.motion
+    problem, body = motion.problems[0], motion.problems[0].bodies[0].name
     poses = tuple(p.poses(theta)[body] for p, theta in zip(motion.problems, clip, strict=True))
-    feet = tuple(c for c in problem.contacts if c.name.startswith("foot"))
+    standing = problem.state(seated.thetas[len(seated.thetas) // 2])
+    feet = tuple(_in_place(c, problem, standing) for c in problem.contacts if c.name.startswith("foot"))
     frames = tuple(
         replace(p, contacts=feet, terms=(DistanceTerm(),), length=problem.manipulator_length)
         for p in motion.problems
     )
     weights = MotionWeights(acceleration=3e-4, skate=50.0, follow=100.0)
-    return MotionProblem(motion.frames, frames, RATE, weights, reference={body: poses}), clip
+    return MotionProblem(motion.frames, frames, RATE, weights, reference={body: poses}, grounded=True)

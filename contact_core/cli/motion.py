@@ -27,6 +27,9 @@ class Motion:
         parser.add_argument(
             "--follow", type=float, default=0.0, metavar="WEIGHT", help="keep to the animation that is there (0)"
         )
+        parser.add_argument(
+            "--ground", action="store_true", help="what is followed is first moved as a whole to its contacts"
+        )
         parser.add_argument("--skate", type=float, metavar="WEIGHT", help="cost of contacts that slip (0.05)")
         parser.add_argument("--tolerance", type=float, default=1.0, metavar="MM", help="of the keys (1 mm)")
         parser.add_argument("--no-pictures", action="store_true", help="no film strip and no movie")
@@ -80,7 +83,9 @@ def _solved(
     from contact_core.solve.solver import SolveStatus
 
     given = {"follow": arguments.follow} | ({} if arguments.skate is None else {"skate": arguments.skate})
-    settings = MotionSettings(MotionWeights(**given), tolerance=1e-3 * arguments.tolerance)
+    settings = MotionSettings(
+        MotionWeights(**given), tolerance=1e-3 * arguments.tolerance, grounded=arguments.ground
+    )
     prior = "current" if arguments.follow > 0.0 else "rest"
     found = session.solve(frames=frames, motion=settings, prior=prior, progress=progress)  # type: ignore[arg-type]
     if found.after.status is SolveStatus.CANCELLED:

@@ -12,6 +12,7 @@ import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray
 from contact_core.errors import InvalidInput
+from contact_core.motion.grounding import grounded
 from contact_core.motion.steps import Clock, StepChart
 from contact_core.rig.rig import Pose
 from contact_core.solve.problem import PoseProblem
@@ -78,7 +79,8 @@ class MotionProblem:
     and be of another size, contacts may slide, fade (`gain`) and be absent. rate: frames per second.
     pins: authored poses by frame and body; those bodies stay exactly there. Frames pinned as a whole before and
     after a range make what is solved between them start and end with their speed. reference: a pose per frame, by
-    body, whose movement is kept: accelerations are then counted against its own.
+    body, whose movement is kept: accelerations are then counted against its own. grounded: whether the reference is
+    first moved as a whole to where its contacts are (`grounding`), as for clips that wander.
     """
 
     frames: tuple[float, ...]
@@ -88,6 +90,7 @@ class MotionProblem:
     bounds: MotionBounds = MotionBounds()
     pins: Mapping[float, Mapping[str, Pose]] = field(default_factory=dict)
     reference: Mapping[str, tuple[Pose, ...]] | None = None
+    grounded: bool = False
 
     def __post_init__(self) -> None:
         frames = tuple(float(frame) for frame in self.frames)
@@ -165,9 +168,10 @@ class MotionProblem:
         """(n, d) theta of the reference; of bodies that it does not name, where each frame's problem starts."""
         if self.reference is None:
             return None
-        return np.array(
+        thetas = np.array(
             [
                 problem.theta_of({body: poses[row] for body, poses in self.reference.items()})
                 for row, problem in enumerate(self.posed)
             ]
         )
+        return grounded(self.posed, thetas, self.clock, self.weights.acceleration) if self.grounded else thetas

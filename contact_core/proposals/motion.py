@@ -50,13 +50,14 @@ class MotionSettings:
 
     weights, bounds, options: of the joint solve; with a weight `follow` the poses that are keyed now are followed,
     which keeps the style of a clip that is repaired. tolerance: metres that any point of the skin may be off with
-    the keys.
+    the keys. grounded: the poses that are followed are first moved as a whole to where their contacts are.
     """
 
     weights: MotionWeights = field(default_factory=MotionWeights)
     bounds: MotionBounds = field(default_factory=MotionBounds)
     options: MotionOptions = field(default_factory=MotionOptions)
     tolerance: float = MILLIMETRE
+    grounded: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < np.inf:
@@ -168,7 +169,7 @@ class _Motion:
             reference = {name: tuple(_pose_in(problem, name) for problem in problems) for name in self.posed}
         return MotionProblem(
             self.frames, tuple(problems), self.rate, self.motion.weights, self.motion.bounds,
-            self._pins(), reference,
+            self._pins(), reference, self.motion.grounded,
         )  # fmt: skip
 
     def _problem_at(self, draft: Draft, frame: float) -> PoseProblem:
