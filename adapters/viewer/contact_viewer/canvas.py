@@ -100,7 +100,7 @@ class Canvas:
         self.theme = theme
         self._base.SetBackground(*theme.bottom)
         self._base.SetBackground2(*theme.top)
-        self._words.shade = theme.bottom
+        self._words.shade, self._words.ink = theme.bottom, theme.ink
         self._texts.set_theme(theme)
 
     def write(self, top: str, bottom: str, middle: str = "") -> None:
@@ -431,6 +431,7 @@ class WordActors:
         self._actors: list[Any] = []
         self._words: Sequence[Label] = ()
         self.shade: Color = (0.0, 0.0, 0.0)
+        self.ink: Color = (1.0, 1.0, 1.0)
 
     def show(self, words: Sequence[Label], ratio: float) -> None:
         """Draw these and no others."""
@@ -447,7 +448,7 @@ class WordActors:
                 look = actor.GetTextProperty()
                 look.SetFontFamilyToArial()
                 look.SetFontSize(round(13 * ratio))
-                look.SetColor(*words[place].color)
+                look.SetColor(*self.ink)  # contacts have dark colours, too
                 look.SetBackgroundColor(*self.shade)
                 look.SetBackgroundOpacity(0.62)
                 look.SetVerticalJustificationToCentered()

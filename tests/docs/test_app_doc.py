@@ -1,0 +1,20 @@
+"""The page of the application: its table of keys is that of the code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from contact_core.interaction.actions import actions_of, key_table
+from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.registry import TOOLS
+
+
+def test_the_table_of_keys_is_that_of_the_code(repository: Path) -> None:
+    page = (repository / "docs" / "app.md").read_text(encoding="utf-8")
+    tools = PluginManager(discover=True, environ={}).offers(TOOLS).values()
+    assert key_table(actions_of(tools)) in page
+
+
+def test_its_pictures_are_there_and_small(repository: Path) -> None:
+    pictures = list((repository / "docs" / "images").glob("app-*"))
+    assert len(pictures) == 3 and all(picture.stat().st_size < 300_000 for picture in pictures)
