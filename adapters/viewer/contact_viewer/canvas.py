@@ -489,7 +489,9 @@ class CornerTexts:
         """Put texts up; an empty one takes its own away."""
         width, height = eye.viewport
         margin = 12 * eye.pixel_ratio
-        places = ((margin, height - margin), (margin, margin), (width / 2, height / 2))
+        letters = max(map(len, middle.splitlines()), default=0)
+        left = max(margin, width / 2 - 0.3 * letters * 13 * eye.pixel_ratio)  # a letter of Courier is 0.6 wide
+        places = ((margin, height - margin), (margin, margin), (left, height / 2))
         for actor, text, (x, y), size in zip(
             self._actors, (top, bottom, middle), places, (14, 14, 13), strict=True
         ):
@@ -499,7 +501,6 @@ class CornerTexts:
             look = actor.GetTextProperty()
             look.SetFontSize(round(size * eye.pixel_ratio))
             look.SetVerticalJustification(2 if actor is self._actors[0] else 1 if actor is self._actors[2] else 0)
-            look.SetJustification(1 if actor is self._actors[2] else 0)
 
 
 def _unlit(renderer: Any, units: float = 0.0) -> tuple[Polygons, Any]:

@@ -18,7 +18,7 @@ from contact_viewer.vtk_events import VtkEvents
 _SIZE = (1280, 800)
 _TICK = 12  # milliseconds between looks at what is due
 _REST = 15  # ticks without a change, after which a frame stands still
-_COLUMN = 26  # rows of the help
+_COLUMN = 27  # rows of the help
 
 
 class Front:
@@ -90,10 +90,10 @@ class Front:
 def help_text(app: Application) -> str:
     """The table of keys in columns."""
     table = sorted((each for each in app.table() if each.keys), key=lambda each: GROUPS.index(each.group))
-    rows = [f"{', '.join(each.keys):<20.20} {each.label:<20.20}" for each in table]
+    rows = [f"{', '.join(each.keys):<20.20} {each.label:<23.23}" for each in table]
     columns = [rows[k : k + _COLUMN] for k in range(0, len(rows), _COLUMN)]
     return "\n".join(
-        "  ".join(column[k] if k < len(column) else " " * 41 for column in columns).rstrip()
+        "  ".join(column[k] if k < len(column) else " " * 44 for column in columns).rstrip()
         for k in range(len(columns[0]) if columns else 0)
     )
 

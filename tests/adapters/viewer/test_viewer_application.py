@@ -158,7 +158,7 @@ def test_the_page_of_keys_names_every_action(hand: Hand) -> None:
     text = help_text(hand.app)
     for action in hand.app.table():
         if action.keys:
-            assert action.label[:20] in text
+            assert action.label[:23] in text
     before = hand.app.canvas.image().astype(int)
     hand.key("?")
     assert hand.app.help_wanted

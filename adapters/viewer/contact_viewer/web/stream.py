@@ -122,8 +122,9 @@ class Stream:
                 if not drawn and not self._sharp:
                     await self._send(still=True)
                     self._sharp = True
-            except Exception:  # one bad frame must not end the application; the artist's document is whole
+            except Exception as error:  # one bad frame must not end the application; the document is whole
                 log.exception("a frame failed")
+                self._app.say(f"that failed by a mistake in the program ({error}); the contacts are as they were.")
                 await asyncio.sleep(0.2)
             await asyncio.sleep(0)  # events come in while nothing is drawn
 
