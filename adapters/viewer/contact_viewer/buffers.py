@@ -20,6 +20,7 @@ class Polygons:
         self._points = vtkPoints()
         self.data.SetPoints(self._points)
         self._held: dict[str, Any] = {}  # the numpy side of what VTK reads, by what it is
+        self._sizes: IntArray | None = None  # of the lines that it holds
 
     def set_points(self, points: FloatArray) -> None:
         """Positions (n, 3): into the memory that VTK reads, where their number is the same."""
@@ -53,7 +54,10 @@ class Polygons:
         self.data.SetPolys(_cells(np.arange(0, triangles.size + 1, 3), np.asarray(triangles).ravel()))
 
     def set_lines(self, sizes: IntArray) -> None:
-        """Polylines over consecutive points, so many each."""
+        """Polylines over consecutive points, so many each; the same sizes as before cost nothing."""
+        if self._sizes is not None and np.array_equal(self._sizes, sizes):
+            return
+        self._sizes = np.array(sizes)
         offsets = np.concatenate([[0], np.cumsum(sizes)])
         self.data.SetLines(_cells(offsets, np.arange(offsets[-1])))
 
@@ -87,3 +91,26 @@ def _cells(offsets: IntArray, corners: IntArray) -> Any:
         numpy_to_vtkIdTypeArray(np.ascontiguousarray(corners, np.int64), deep=True),
     )
     return made
+
+
+class Normals:
+    """Normals of points whose triangles (m, 3) stay: each the sum of its faces', which count by their area."""
+
+    def __init__(self, triangles: IntArray, count: int) -> None:
+        from scipy.sparse import csr_matrix
+
+        self._corners = np.ascontiguousarray(np.asarray(triangles, np.int64).T)  # (3, m)
+        m = self._corners.shape[1]
+        entries = (np.ones(3 * m, np.float32), (self._corners.ravel(), np.tile(np.arange(m), 3)))
+        self._point_from_face = csr_matrix(entries, shape=(count, m))
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """(n, 3) unit normals for points (n, 3); zero where no face is."""
+        a, b, c = (points[corner] for corner in self._corners)
+        (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
+        faces = np.stack(
+            [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1
+        )  # (m, 3), twice the area
+        sums = self._point_from_face @ faces
+        length = np.sqrt(np.einsum("ni,ni->n", sums, sums))[:, None]
+        return np.asarray(np.divide(sums, length, out=np.zeros_like(sums), where=length > 0))

@@ -27,7 +27,7 @@ from contact_core.interaction.overlay import (
     PairLine,
     StrokeTint,
 )
-from contact_viewer.buffers import Polygons
+from contact_viewer.buffers import Normals, Polygons
 from contact_viewer.eye import Eye
 from contact_viewer.gl import is_software
 from contact_viewer.look import DARK, Theme, darker
@@ -273,19 +273,19 @@ class SurfaceActor:
         look.SetSpecularPower(22)
         self._faces: Any = None
         self._points: Any = None
+        self._normals: Normals
         self.color: Color = (0.7, 0.7, 0.7)
         renderer.AddActor(self._actor)
 
-    def set_shape(self, points: FloatArray, faces: IntArray, normals: FloatArray) -> None:
-        """Points and normals (n, 3) and faces (m, 3) in the surface's own space; the very same arrays as before
-        cost nothing."""
+    def set_shape(self, points: FloatArray, faces: IntArray) -> None:
+        """Points (n, 3) and faces (m, 3), surface space; the very same arrays as before cost nothing."""
+        if faces is not self._faces:
+            self._faces, self._normals = faces, Normals(faces, len(points))
+            self._polygons.set_faces(faces)
         if points is not self._points:
             self._points = points
             self._polygons.set_points(points)
-            self._polygons.set_normals(normals)
-        if faces is not self._faces:
-            self._faces = faces
-            self._polygons.set_faces(faces)
+            self._polygons.set_normals(self._normals.at(points))
 
     def set_place(self, world_from_surface: FloatArray) -> None:
         """Where it stands (4, 4)."""
@@ -325,6 +325,7 @@ class FillActor:
         self._shown: Decal | Ghost | None = None
         self._ratio = 0.0
         self._ends: IntArray = np.zeros((0, 2), np.int64)
+        self._normals: Normals
         self._face, self._rim = Polygons(), Polygons()
         self._actors = []
         for polygons, units in ((self._face, -60.0), (self._rim, -110.0)):
@@ -350,12 +351,13 @@ class FillActor:
         if fill is self._shown and ratio == self._ratio:
             return
         before, self._shown, self._ratio = self._shown, fill, ratio
-        self._face.set_points(fill.points)
-        self._face.set_normals(_normals(fill.points, fill.triangles))
         if before is None or before.triangles is not fill.triangles:
+            self._normals = Normals(fill.triangles, len(fill.points))
             self._face.set_faces(fill.triangles)
             self._ends = _rim(fill.triangles)
             self._rim.set_lines(np.full(len(self._ends), 2))
+        self._face.set_points(fill.points)
+        self._face.set_normals(self._normals.at(fill.points))
         self._rim.set_points(fill.points[self._ends.ravel()])
         chosen = isinstance(fill, Decal) and fill.selected
         face, rim = (actor.GetProperty() for actor in self._actors)
@@ -540,17 +542,6 @@ def _matrix(values: FloatArray) -> Any:
     matrix = vtkMatrix4x4()
     matrix.DeepCopy(np.asarray(values, float).ravel().tolist())
     return matrix
-
-
-def _normals(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """(n, 3) of points by the areas of their triangles."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a).astype(float)  # (t, 3)
-    normals = np.stack(
-        [sum(np.bincount(triangles[:, k], cross[:, axis], len(points)) for k in range(3)) for axis in range(3)], 1
-    )
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
 
 
 def _rim(triangles: IntArray) -> IntArray:

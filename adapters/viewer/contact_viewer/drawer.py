@@ -55,7 +55,7 @@ class Drawer:
         for name, seen in scene.surfaces.items():
             actor = self._canvas.surface(name)
             if self._drawn.get(name) is not seen.mesh:
-                actor.set_shape(seen.mesh.points, seen.mesh.faces, seen.mesh.vertex_normals)
+                actor.set_shape(seen.mesh.points, seen.mesh.faces)
                 self._drawn[name] = seen.mesh
             actor.set_place(seen.world)
 

@@ -73,7 +73,7 @@ class ViewerHost(MemoryHost):
         shown = () if picture is None else picture.meshes
         for place, item in enumerate(shown):
             surface = self.canvas.surface(f"picture {place}")
-            surface.set_shape(item.mesh.points, item.mesh.faces, item.mesh.vertex_normals)
+            surface.set_shape(item.mesh.points, item.mesh.faces)
             surface.set_look(item.color, opacity=item.opacity)
         self.canvas.keep_surfaces(f"picture {place}" for place in range(len(shown)))
         self.canvas.show(Overlay() if picture is None else _overlay(picture))

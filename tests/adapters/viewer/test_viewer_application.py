@@ -281,9 +281,9 @@ def test_a_large_mesh_is_sent_once(hand: Hand) -> None:
     """Frames without a change send nothing, however large the scene is."""
     surface = hand.app.canvas.surface("ball")
     ball = icosphere(4)
-    surface.set_shape(ball.points, ball.faces, ball.vertex_normals)
+    surface.set_shape(ball.points, ball.faces)
     uploaded = surface._polygons.data.GetMTime()
     for _ in range(3):
-        surface.set_shape(ball.points, ball.faces, ball.vertex_normals)
+        surface.set_shape(ball.points, ball.faces)
     assert surface._polygons.data.GetMTime() == uploaded
     assert not hand.front.tick()

@@ -14,6 +14,7 @@ from contact_core.testing.meshes import icosphere
 
 pytest.importorskip("vtkmodules")
 
+from contact_viewer.buffers import Normals
 from contact_viewer.canvas import Canvas
 from contact_viewer.eye import Eye
 from contact_viewer.gl import off_screen_window
@@ -29,7 +30,7 @@ def canvas() -> Canvas:
     made = Canvas(off_screen_window(SIZE))
     ball = icosphere(3)
     surface = made.surface("ball")
-    surface.set_shape(ball.points, ball.faces, ball.vertex_normals)
+    surface.set_shape(ball.points, ball.faces)
     surface.set_look((0.7, 0.7, 0.7))
     return made
 
@@ -157,13 +158,23 @@ def test_what_is_uploaded_in_place_is_what_is_drawn(canvas: Canvas, eye: Eye) ->
     """Points moved in place give the image of a surface made anew at the new points."""
     ball = icosphere(3)
     moved = ball.points * [0.6, 0.9, 1.0]
-    canvas.surface("ball").set_shape(moved, ball.faces, ball.vertex_normals)
+    canvas.surface("ball").set_shape(moved, ball.faces)
     in_place = canvas.image()
     canvas.keep_surfaces(())
-    canvas.surface("ball").set_shape(moved, ball.faces, ball.vertex_normals)
+    canvas.surface("ball").set_shape(moved, ball.faces)
     canvas.surface("ball").set_look((0.7, 0.7, 0.7))
     np.testing.assert_array_equal(canvas.image(), in_place)
-    canvas.surface("ball").set_shape(ball.points, ball.faces, ball.vertex_normals)
+    canvas.surface("ball").set_shape(ball.points, ball.faces)
+
+
+def test_normals_are_those_of_the_mesh() -> None:
+    """Weighted by area they are, on a sphere, where a point is; no face, no normal."""
+    ball = icosphere(3)
+    turned = np.roll(ball.points, 1, axis=1) * 2.0
+    np.testing.assert_allclose(Normals(ball.faces, len(turned)).at(turned), turned / 2.0, atol=0.02)
+    alone = np.concatenate([turned, [[9.0, 9.0, 9.0]]])
+    assert not Normals(ball.faces, len(alone)).at(alone)[-1].any()
+    assert Normals(np.zeros((0, 3), int), 2).at(np.zeros((2, 3))).shape == (2, 3)
 
 
 def test_the_camera_moves_as_the_pointer_does(eye: Eye) -> None:
