@@ -73,6 +73,9 @@ def _strip(v3: Any, html: Any) -> None:
                 input="trigger('go_to', [Number($event.target.value)])", title="Frame",
             )  # fmt: skip
         html.Span("{{ film.frame }}", classes="frame")
+        html.Span("of", style="opacity: .6; padding: 0 4px;")
+        html.Input(type="number", value=("film.last",), title="The last frame of the film", classes="last",
+                   change="trigger('film_end', [Number($event.target.value)])")  # fmt: skip
 
 
 def _button(v3: Any, icon: str, tip: str, **attributes: Any) -> None:

@@ -181,6 +181,7 @@ class WebApplication:
         told("recolor")(lambda patch, color: app.recolor(str(patch), str(color)))
         told("set")(lambda slot, name, item, value: panel.set_setting(app.interaction, slot, name, item, value))
         told("go_to")(lambda frame: app.go_to(float(frame)))
+        told("film_end")(lambda last: app.session.timeline.set(last=float(last)))
         told("open")(self._open)
         told("write")(lambda path: app.write(_path(path)))
         told("uploaded")(lambda text, fine: app.say(str(text)))
