@@ -95,6 +95,51 @@ def test_paint_transfer_drag_solve_and_undo(hand: Hand) -> None:
     assert app.undo_name() == f"Paint {name}"
 
 
+@pytest.mark.slow
+def test_the_operations_of_the_paper_on_the_real_hand_and_bunny(assets: Path, tmp_path: Path) -> None:
+    """Paint, axis, transfer, move, turn, bend, scale and link: each by mouse and keys, each one step, each seen."""
+    files = ["rigs/webxr_generic_hand_left.glb", "objects/stanford_bunny_35k.obj"]
+    app = application([str(assets / each) for each in files], tmp_path / "state", (900, 600))
+    hand = Hand(app)
+    _, bunny = app.session.document.surfaces
+    app.interaction.set(live=False)  # what the hand does meanwhile has tests of its own
+    app.interaction.select(surface=bunny)
+    middle = hand.on_thing(bunny)
+    told: list[str] = []
+
+    def does(key: str, title: str, *path: Any, held: tuple[Any, ...] = ()) -> None:
+        """One gesture is one step of that name, and another picture."""
+        hand.key(key)
+        before, revision = app.canvas.image().astype(int), app.session.revision
+        hand.drag(*path, held=held)
+        assert app.session.revision == revision + 1, (title, app.line(), app.refusal())
+        assert app.undo_name().startswith(title)
+        assert np.abs(app.canvas.image().astype(int) - before).max() > 40
+        told.append(title)
+
+    across = [by(middle, right, 0.3 * right) for right in (-50, -30, -10, 10, 30)]
+    does("B", "Paint", *across)
+    (first,) = app.session.document.patches
+    does("W", "Set the axis of", *across)
+    does("G", "Translate", hand.on_patch(first), by(hand.on_patch(first), 6, -9))
+    does("R", "Rotate", hand.on_patch(first, 0.9), by(hand.on_patch(first, 0.9), -6, -22))
+    does("D", "Bend", hand.on_patch(first, 0.8), by(hand.on_patch(first, 0.8), 10, -14))
+    does("S", "Scale", hand.on_patch(first, 0.9), by(hand.on_patch(first, 0.9), -14, 2))
+    app.interaction.select(first, surface=bunny)
+    does("T", "Transfer", by(middle, 10, 80), by(middle, 30, 85), by(middle, 50, 88))
+    (second,) = set(app.session.document.patches) - {first}
+    does("K", "Link", hand.on_patch(second), hand.on_patch(first))
+    assert len(told) == 8
+    script = document_to_json(app.session.document)
+    for _ in told:
+        hand.key("Ctrl+Z")
+    assert not app.session.document.patches
+    for _ in told:
+        hand.key("Ctrl+Shift+Z")
+    assert document_to_json(app.session.document) == script
+    app.close()
+
+
 def test_escape_puts_everything_back(hand: Hand) -> None:
     app = hand.app
     start = app.session.document

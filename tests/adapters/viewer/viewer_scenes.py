@@ -91,6 +91,13 @@ class Hand:
         middle = candidates.mean(axis=0)
         return self.pixel(candidates[np.linalg.norm(candidates - middle, axis=1).argmin()])
 
+    def on_patch(self, name: str, share: float = 0.5) -> Any:
+        """(2,) a pixel of a patch, a share of the way along its axis, aside from it by nothing."""
+        shown = self.app.interaction.desk.shown
+        seen = self.app.interaction.desk.scene.surfaces[self.app.session.document.patch(name).surface]
+        points = seen.positions(shown.axis(name).points)
+        return self.pixel(points[round(share * (len(points) - 1))])
+
     def on_thing(self, surface: str) -> Any:
         """(2,) the pixel of the middle of a thing."""
         points = self.app.interaction.desk.scene.surfaces[surface].points
