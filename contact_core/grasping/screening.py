@@ -15,6 +15,7 @@ from contact_core.grasping.facts import STRAIGHT, enclosure
 from contact_core.grasping.hand import Hand, spread_out
 from contact_core.grasping.slots import Approaches
 
+AT_REACH, AT_PRICE = 0.08, 6.0  # hand lengths from the place to hold that are free, and what one more costs
 FAR = 0.06  # hand lengths: a pad farther away is not on the object
 DEEP = 0.012  # hand lengths: skin this much deeper spoils a grasp
 SHALLOW = 0.004  # hand lengths that a solve makes good
@@ -76,6 +77,15 @@ def uneven(hand: Hand, angles: FloatArray, used: BoolArray) -> FloatArray:
     both = used[:, fingers[1:]] & used[:, fingers[:-1]]
     steps = np.where(both, np.abs(np.diff(total[:, fingers], axis=1)), 0.0)
     return np.asarray(steps.max(axis=1, initial=0.0) / (np.pi / 2.0))
+
+
+def elsewhere(hand: Hand, closed: Closed, at: FloatArray | None) -> FloatArray:
+    """(N,) the price of touching far from the place (3,) that is to be held; nothing where no place is named."""
+    if at is None:
+        return np.zeros(len(closed.placed))
+    touching = hand.has_pad & (np.abs(closed.fits[:, :, 0]) < 0.5 * FAR * hand.length)
+    away = np.where(touching, np.linalg.norm(closed.fits[:, :, 5:8] - at, axis=2), np.inf).min(axis=1) / hand.length
+    return np.asarray(AT_PRICE * np.clip(away - AT_REACH, 0.0, 1.0))
 
 
 def straight(hand: Hand, angles: FloatArray, used: BoolArray) -> FloatArray:

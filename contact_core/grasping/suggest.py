@@ -36,7 +36,7 @@ from contact_core.grasping.filled import KeepOutTerm, filled
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.metrics import Contact, PosedScene, measure
 from contact_core.grasping.pads import painted_pads
-from contact_core.grasping.screening import distinct, first_look, seen_from
+from contact_core.grasping.screening import distinct, elsewhere, first_look, seen_from
 from contact_core.grasping.slots import KINDS, Approaches, GraspFacts, GraspRequest, Kind
 from contact_core.grasping.verdict import Verdict, judge, judge_hold
 from contact_core.plugins.registry import GRASP_SAMPLERS, GRASP_SCORES, PLACERS, POSE_TERMS
@@ -238,12 +238,14 @@ def screened(
     values = np.zeros(0)
     if len(approaches.kinds):
         rough = _closed(hand.quick, field, approaches)
-        values = first_look(hand, scene.mesh, approaches, rough)
+        values = first_look(hand, scene.mesh, approaches, rough) - elsewhere(hand, rough, at)
         best = _shared_out(approaches, values, SECOND_LOOK)
         approaches = approaches[best]
     progress.tell(0.6, "Turning the thumb")
     closed = _closed(hand, field, approaches)
-    value = first_look(hand, scene.mesh, approaches, closed) if len(approaches.kinds) else values
+    value = values
+    if len(approaches.kinds):
+        value = first_look(hand, scene.mesh, approaches, closed) - elsewhere(hand, closed, at)
     return approaches, closed, value, seen_from(hand, field, closed.placed)
 
 
@@ -375,7 +377,7 @@ def _place(scene: GraspScene, draft: RecordingDraft, names: tuple[str, ...]) -> 
         object_mesh=draft.geometry.mesh(scene.object_name),
         object_from_rig=np.asarray(np.linalg.inv(world[scene.object_name]) @ world[scene.hand_name]),
         patch_points={name: draft.geometry.points(name) for name in names},
-        patch_axes={name: draft.geometry.axis(name).points for name in names},
+        patch_axes={name: draft.geometry.axis_points(name) for name in names},
         reach=0.05 * hand_share(scene),
     )
     result = scene.plugins.get(PLACERS, scene.plugins.name_for(PLACERS, "settle")).place(request)

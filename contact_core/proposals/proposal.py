@@ -13,7 +13,7 @@ import numpy as np
 
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command
-from contact_core.errors import Cancelled, InvalidInput
+from contact_core.errors import Cancelled, InvalidInput, NotManifold
 from contact_core.plugins.registry import PLACERS, POSE_SOLVERS
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.plugins.solving import PluginSolver
@@ -222,7 +222,10 @@ def _place_all(draft: Draft, plugins: PluginManager, reach: float, solids: Solid
         )
         result = plugins.get(PLACERS, plugins.name_for(PLACERS, "settle")).place(request)
         for name, place in result.placed.items():
-            draft.patches.place(pairs[name].object, place.root, direction=place.direction)
+            try:
+                draft.patches.place(pairs[name].object, place.root, direction=place.direction)
+            except NotManifold as error:  # one broken edge costs the contact beside it, not the others
+                left_out[name] = str(error)
         left_out.update(result.left_out)
     return left_out
 

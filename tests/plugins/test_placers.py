@@ -174,6 +174,33 @@ def test_pads_out_of_reach_are_left_out_and_named_with_their_distance() -> None:
         FromPose(approach=UPWARD, without=("*",)).place(ask)
 
 
+def test_a_broken_edge_costs_the_pad_beside_it_and_no_other() -> None:
+    """A third face on every edge round the place where one pad comes: it is named, and all others are placed."""
+    ask = replace(request(), pose=curled(request().rig, job().recipe.manipulators[0].pose))
+    closed = configured(FromPose, job().recipe.placer_options, "it").place(ask)
+    assert closed.pose is not None
+    asked = replace(ask, pose=closed.pose)
+    whole = FromPose().place(asked)
+    name = next(iter(whole.placed))
+    mesh = asked.object_mesh
+    here = whole.placed[name].root.positions(mesh)[0]
+    away = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - here, axis=1)
+    near = np.argsort(away)[:12]
+    inner = mesh.points.mean(axis=0)
+    fins = np.array(
+        [
+            (a, b, len(mesh.points))
+            for face in mesh.faces[near]
+            for a, b in zip(face, np.roll(face, -1), strict=True)
+        ]
+    )
+    broken = TriangleMesh(np.vstack([mesh.points, inner]), np.vstack([mesh.faces, fins]))
+    found = FromPose().place(replace(asked, object_mesh=broken))
+    assert set(found.placed) | set(found.left_out) == set(whole.placed) | set(whole.left_out)
+    assert name in found.left_out and "manifold" in found.left_out[name], found.left_out
+    assert len(found.placed) >= 1
+
+
 def test_the_naive_placer_leaves_the_fingers_open() -> None:
     result = Naive(approach=UPWARD, without=("thumb*",)).place(request())
     rig = request().rig

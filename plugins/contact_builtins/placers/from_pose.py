@@ -14,6 +14,7 @@ from contact_builtins.placers.closing import OPPOSE, Approaching, close, search_
 from contact_builtins.placers.hand_pose import HandPose, dominant_joint, matching
 from contact_builtins.placers.pads import Pad, pads_of, place_pad
 from contact_core.arrays import IntArray
+from contact_core.errors import NotManifold
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.plugins.slots import PatchPlacement, PlacementRequest, PlacementResult
@@ -72,7 +73,10 @@ def place_pads(request: PlacementRequest, hand: HandPose, reach: float, facing: 
                 f"{100 * found[1] / manipulator_length(request.rig):.1f} % of the length away from the object"
             )
         else:
-            placed[name] = place_pad(request.object_mesh, pad, found[0])
+            try:
+                placed[name] = place_pad(request.object_mesh, pad, found[0])
+            except NotManifold as error:  # one broken edge costs the pad beside it, not the grasp
+                left_out[name] = str(error)
     return PlacementResult(placed, left_out, hand.pose())
 
 
