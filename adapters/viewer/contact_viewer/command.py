@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 
 class ViewCommand:
@@ -42,14 +45,17 @@ class ViewCommand:
         app = Application(Canvas(off_screen_window((1280, 720))), arguments.files, arguments.plugins)
         output = arguments.output
 
-        def ready(address: str) -> None:
-            for note in app.notes:
-                output.remark(f"contact: {note}")
-            output.answer({"address": address}, f"open {address}\n(Ctrl+C ends it; what is not saved comes back.)")
-            if not arguments.no_browser:
-                _open(address)
+        with ExitStack() as stack:
 
-        WebApplication(app, ready).run(arguments.port)
+            def ready(address: str) -> None:
+                for note in app.notes:
+                    output.remark(f"contact: {note}")
+                ending = "(Ctrl+C ends it; what is not saved comes back.)"
+                output.answer({"address": address}, f"open {address}\n{ending}")
+                if not arguments.no_browser:
+                    stack.enter_context(_way_in(address))()
+
+            WebApplication(app, ready).run(arguments.port)
         return 0
 
 
@@ -60,20 +66,30 @@ def _check_extra(*modules: str) -> None:
         raise MissingExtra("contact view", "app")
 
 
-def _open(address: str) -> None:
-    """Show it: in an app window of a Chromium where there is one, else in the browser."""
+@contextmanager
+def _way_in(address: str) -> Iterator[Callable[[], None]]:
+    """A function that shows the address: in an app window of a Chromium where there is one, else in the browser.
+
+    The address holds the key, and what is on a command line everybody on the machine can read: so the browser is
+    given a file that only this user can, and that goes on to the address.
+    """
+    import html
     import shutil
     import subprocess
+    import tempfile
     import webbrowser
 
-    for name in ("chromium", "google-chrome", "chrome", "msedge"):
-        found = shutil.which(name)
-        if found is not None:
-            subprocess.Popen(
-                [found, f"--app={address}"],
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
-            )
-            return
-    webbrowser.open(address)
+    with tempfile.TemporaryDirectory(prefix="contact-view-") as folder:  # only its owner may look into it
+        page = Path(folder) / "open.html"
+        page.write_text(f'<meta http-equiv="refresh" content="0;url={html.escape(address)}">', encoding="utf-8")
+        names = ("chromium", "google-chrome", "chrome", "msedge")
+        found = next(filter(None, map(shutil.which, names)), None)
+
+        def show() -> None:
+            if found is None:
+                webbrowser.open(page.as_uri())
+                return
+            quiet = subprocess.DEVNULL
+            subprocess.Popen([found, f"--app={page.as_uri()}"], stdout=quiet, stderr=quiet, start_new_session=True)
+
+        yield show
