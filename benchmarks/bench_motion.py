@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from harness import record
-from motion_scenes import RATE, ball_grip, baseball, growing, reach, sitting, skating
+from motion_scenes import RATE, ball_grip, baseball, growing, reach, regrasping, sitting, skating
 
 from contact_core.arrays import FloatArray
 from contact_core.motion.problem import MotionProblem
@@ -94,6 +94,30 @@ def reaching() -> dict[str, Any]:
         "reach: penetration while held, % of the hand": 100.0 * report.penetration_held / length,
         "reach: gap while held, mm": MM * float(np.mean([pair.mean for pair in report.pairs.values()])),
         "reach: ms a frame": ms,
+    }
+
+
+def grips() -> dict[str, Any]:
+    """Knuckleball, two-seam, curveball: the fingers regrasp one after another."""
+    motion = regrasping()
+    solution, ms = timed(motion)
+    report, alone = (motion_report(motion, t) for t in (solution.thetas, solution.causal))
+    errors = [np.mean([pair.mean for pair in r.pairs.values()]) for r in (report, alone)]
+    hand, length = motion.problems[0].bodies[0], motion.problems[0].manipulator_length
+    keys = reduce_poses(hand.rig, motion.frames, solution.poses(hand.name))
+    steps, deep = (
+        [r.largest_step for r in (report, alone)],
+        max(report.penetration_held, report.penetration_transit),
+    )
+    return {
+        "regrasps: pop of the joint solve; frame by frame": f"{report.pop:.2f}; {alone.pop:.2f}",
+        "regrasps: largest step, mm; frame by frame": "; ".join(f"{MM * step:.1f}" for step in steps),
+        "regrasps: gap while held over per-frame optimum": float(errors[0] / errors[1]),
+        "regrasps: gap while held, mm": float(MM * errors[0]),
+        "regrasps: skate while held, max, mm/frame": MM * max(p.skate_max for p in report.pairs.values()) / RATE,
+        "regrasps: penetration, % of the hand": 100.0 * deep / length,
+        f"regrasps: {len(motion.frames)} frames to cubic keys": len(keys.keys.frames),
+        "regrasps: ms a frame": ms,
     }
 
 
@@ -191,7 +215,7 @@ if __name__ == "__main__":
     parser.add_argument("--quick", action="store_true")
     quick = parser.parse_args().quick
     timed(baseball(4))  # compiles and warms
-    rows = flight(90.0) | flight(300.0) | reaching() | sphere() | keying()
+    rows = flight(90.0) | flight(300.0) | reaching() | grips() | sphere() | keying()
     rows |= lengths((30, 60) if quick else (30, 60, 120, 240, 480))
     if not quick:
         seated, truth = sitting_down()

@@ -10,6 +10,7 @@ from pose_grips import Grip
 from pose_scenes import chair
 
 from contact_core.arrays import FloatArray
+from contact_core.document.timeline import Span
 from contact_core.geometry.raycast import Locator
 from contact_core.motion.problem import MotionProblem, MotionWeights
 from contact_core.motion.solving import MotionSolution, solve_motion
@@ -96,6 +97,38 @@ def reach(seconds: float = 4.0, away: float = 0.31, rate: float = RATE) -> Motio
     return MotionProblem(
         tuple(frames.astype(float)), tuple(problems), rate, pins={0.0: resting, float(frames[-1]): resting}
     )
+
+
+GRIPS = {  # how far each fingertip's contact is turned over the ball, rad: thumb and fingers in their order
+    "knuckleball": (0.12, -0.22, -0.22, -0.22, -0.16),
+    "two-seam": (0.0, 0.0, 0.0, 0.0, 0.0),
+    "curveball": (-0.12, 0.22, 0.26, 0.1, 0.06),
+}
+
+
+def regrasping(hold: int = 24, lag: int = 5, lift: int = 8, ramp: int = 6) -> MotionProblem:
+    """Three grips of a baseball; in between, the fingers let go and take hold again one after another.
+
+    A finger leaves `lag` frames after the one before it, and is off the ball for `lift` frames. ramp: frames over
+    which a contact fades. Each finger has a contact in each grip, on while a span of the document would be.
+    """
+    grip = ball_grip()
+    fingers = len(grip.contacts)
+    length = hold + lag * (fingers - 1) + lift  # from one grip to the next
+    last = length * len(GRIPS) - lift
+    contacts, spans = [], []
+    for number, (title, angles) in enumerate(GRIPS.items()):
+        for finger, (contact, angle) in enumerate(zip(grip.contacts, angles, strict=True)):
+            contacts.append(replace(slid(contact, grip, angle), name=f"{contact.name} {title}"))
+            on = 0.0 if number == 0 else float(length * number + lag * finger)
+            off = float(last) if number == len(GRIPS) - 1 else float(length * (number + 1) + lag * finger - lift)
+            spans.append(Span(on, off, ramp, ramp))
+    problems = []
+    for frame in range(last + 1):
+        gains = [span.gain(float(frame)) for span in spans]
+        now = tuple(replace(c, gain=gain) for c, gain in zip(contacts, gains, strict=True))
+        problems.append(replace(grip, contacts=now))
+    return MotionProblem(tuple(map(float, range(last + 1))), tuple(problems), RATE)
 
 
 def _outwards(grip: PoseProblem) -> FloatArray:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from contact_core.arrays import digest
 from contact_core.document.codec import to_json
 from contact_core.document.document import ContactDocument
 from contact_core.document.timeline import PoseKey, Track
 
+T = TypeVar("T")
 REACH = 1.0  # seconds to either side of a key within which a change makes it stale
 
 
@@ -22,19 +24,34 @@ def motion_source(document: ContactDocument, frame: float) -> str:
     low, high = frame - near, frame + near
     parts: list[Any] = [
         document.timeline.rate,
-        [(p.name, p.surface, p.shape, p.mirrored, p.turns, p.along, p.spread) for p in document.patches.values()],
-        [to_json(p.placement) for p in document.patches.values()],
-        [(key, s.axis.digest, s.coordinates.digest, digest(s.weights)) for key, s in document.shapes.items()],
-        [to_json(pair) for pair in document.pairs.values()],
-        [(s.name, s.digest, s.meters_per_unit, s.world_from_surface.tolist()) for s in document.surfaces.values()],
+        [(p.name, p.surface, p.shape, p.mirrored, p.turns, p.along, p.spread) for p in _in_order(document.patches)],
+        [to_json(p.placement) for p in _in_order(document.patches)],
+        [
+            (key, s.axis.digest, s.coordinates.digest, digest(s.weights))
+            for key, s in sorted(document.shapes.items(), key=_name)
+        ],
+        [to_json(pair) for pair in _in_order(document.pairs)],
+        [
+            (s.name, s.digest, s.meters_per_unit, s.world_from_surface.tolist())
+            for s in _in_order(document.surfaces)
+        ],
     ]
-    for where, track in document.tracks.items():
+    for where, track in sorted(document.tracks.items(), key=_name):
         keys = [to_json(key) for key in _near(track, low, high)]
         parts += [[where, keys]] if keys else []
-    for pair, spans in document.spans.items():
+    for pair, spans in sorted(document.spans.items(), key=_name):
         reached = [s for s in spans if s.on - s.ease_in <= high and low <= s.off + s.ease_out]
         parts.append([pair, [to_json(span) for span in reached]])
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
+
+
+def _name(item: tuple[str, Any]) -> str:
+    return item[0]
+
+
+def _in_order(items: Mapping[str, T]) -> list[T]:
+    """By name: a document that was saved and opened again lists its parts in another order."""
+    return [items[name] for name in sorted(items)]
 
 
 def _near(track: Track, low: float, high: float) -> list[Any]:

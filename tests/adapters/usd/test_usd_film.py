@@ -1,0 +1,55 @@
+"""A film in USD: solved, keyed, saved, and read again by USD's own evaluation of skeletons."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr")
+import contact_core as contact
+from contact_core.proposals.motion import MotionProposal
+from contact_core.rig.rig import forward_kinematics, skin
+from contact_core.testing import meshes
+from contact_core.testing.host_scenes import arm_rig
+from contact_usd.host import UsdHost
+
+
+def test_time_samples_land_on_the_solved_skin(tmp_path: Path) -> None:
+    rig, small = arm_rig(), meshes.icosphere(2)
+    host = UsdHost()
+    arm = host.add(contact.Asset("arm", rig.surface, rig, meters_per_unit=1.0))
+    ball = contact.TriangleMesh(0.2 * small.points + [0.6, 0.5, 0.1], small.faces)
+    host.add(contact.Asset("ball", ball, meters_per_unit=1.0))
+    with contact.Session(host=host, objects=None, discover=False) as session:
+        hand, thing = session.document.surfaces
+        mesh, ball = session.geometry.mesh(hand), session.geometry.mesh(thing)
+        tip = int(np.argmax(mesh.points[:, 1] + mesh.points[:, 0]))
+        near = np.argsort(np.linalg.norm(mesh.points - mesh.points[tip], axis=1))[:6]
+        points = contact.SurfacePoints.at_vertices(mesh, near)
+        session.patches.paint("tip", points, surface=hand, axis=points[:1], heading=1.0)
+        side = contact.SurfacePoints.at_vertices(ball, [int(np.argmin(ball.points[:, 0]))])
+        session.pairs.add("tip", session.patches.transfer("tip", thing, side, heading=1.0), name="touch")
+        session.timeline.set(1, 13, 24)
+        session.timeline.key("place", thing, frame=1)
+        session.timeline.go(13)
+        moved = session.document.surface(thing).world_from_surface.copy()
+        moved[:3, 3] += [0.0, 0.2, 0.1]
+        session.surfaces.place(thing, moved)
+        found = session.solve(frames=session.timeline.settings.frames())
+        session.accept(found)
+        session.save(tmp_path / "film.usda")
+        assert isinstance(found, MotionProposal) and found.motion is not None
+        solved, document = found.motion.poses(hand), session.timed_document
+    again = UsdHost(tmp_path / "film.usda")
+    keys = again.pose_keys(arm)
+    assert keys[0] == 1.0 and keys[-1] == 13.0 and len(keys) <= 13
+    for row, pose in enumerate(solved):
+        wanted = skin(rig, forward_kinematics(rig.parents, pose.local))
+        drawn = again.skin_points(arm, again.read_pose(arm, float(row + 1)))
+        off = np.linalg.norm(drawn - wanted, axis=1).max()
+        assert off <= 1.05e-3  # linear between samples, within a millimetre
+    with contact.Session(host=again, discover=False) as reopened:
+        assert set(reopened.timed_document.tracks) == set(document.tracks)
+        assert reopened.timeline.stale(hand) == ()
