@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -159,6 +160,18 @@ def test_it_is_refused_where_that_is_wanted() -> None:
         with pytest.raises(NotManifold):
             session.patches.brush("disk", "spot", surface="thing", at=0.75 * at_the_fin(mesh)[None], radius=0.4)
         assert not session.document.patches and session.document.surface("thing").proxy is None
+
+
+def test_without_the_library_it_is_refused_with_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("CONTACT_CACHE", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "manifold3d", None)
+    mesh = BROKEN["fin"]()
+    with session_on(mesh) as session:
+        with pytest.raises(NotManifold, match=r"more than two faces.*contact-core\[proxies\]"):
+            session.patches.brush("disk", "spot", surface="thing", at=0.75 * at_the_fin(mesh)[None], radius=0.4)
+        assert session.document.surface("thing").proxy is None and not session.document.patches
 
 
 def test_one_patch_runs_over_parts_that_overlap() -> None:
