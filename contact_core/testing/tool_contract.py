@@ -71,8 +71,10 @@ def drag(name: str) -> FloatArray:
     spot = artist.pixel("ball", artist.session.geometry.points("spot"))
     pad = artist.pixel("hand", artist.session.geometry.points("pad"))
     line = np.array([[0.0, 0.0], [5.0, -3.0], [13.0, 9.0], [2.0, 14.0]])
-    if name == "across":
-        return np.stack([pad[12], 0.5 * (pad[12] + spot[18]), spot[18]])
+    if name in ("across", "siblings"):
+        copy = artist.pixel("ball", artist.session.geometry.points("copy"))
+        first, last = (pad[12], spot[18]) if name == "across" else (spot[18], copy[3])
+        return np.stack([first, 0.5 * (first + last), last])
     return line + {"patch": spot[18], "ball": spot[12] + [10.0, 75.0], "hand": pad[12]}[name]
 
 
@@ -172,7 +174,7 @@ class ToolContract(Contract):
     def test_u08_edits(self, tool: Tool) -> None:
         """One of the drags is a step, with a title."""
         titles = []
-        for name in DRAGS:
+        for name in (*DRAGS, "siblings"):
             artist = artist_with(tool)
             artist.session.listen(lambda change: titles.append(change.command) if change.kind == "do" else None)
             dragged(artist, name)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from contact_builtins.tools.axis import DrawAxis
@@ -49,7 +51,7 @@ class TestLasso(ToolContract):
 
     @pytest.fixture
     def tool(self) -> Tool:
-        return LASSO
+        return replace(LASSO, spacing=0.06)
 
 
 class TestCurve(ToolContract):
@@ -105,8 +107,6 @@ class TestTransfer(ToolContract):
 
 
 class TestLink(ToolContract):
-    cannot = {"edits": "no two patches of the scene lie on one surface and are met by one of the drags"}
-
     @pytest.fixture
     def tool(self) -> Tool:
         return LinkPatches()

@@ -15,6 +15,7 @@ from contact_core.document.document import ContactDocument
 from contact_core.document.schema import document_to_json
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.interaction.view import world_per_pixel
 from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, POSE_SOLVERS, TOOLS
 from contact_core.testing.artist import Artist, ball_and_hand, paired
 
@@ -378,6 +379,23 @@ def test_contacts_are_reached_through_what_hides_them() -> None:
     before = artist.session.document
     artist.drag(*(on_spot(artist) + SPOT))
     assert artist.session.document.patch("spot").placement != before.patch("spot").placement
+
+
+def test_a_stroke_on_a_posed_hand_lands_where_it_is_seen() -> None:
+    artist = ball_and_hand()
+    artist.hands.take_up("joint")
+    tip = artist.pixel("hand", artist.session.geometry.points("pad"))[12]
+    artist.drag(tip, tip + by(-10.0, -40.0), tip + by(-30.0, -120.0))
+    posed = artist.pixel("hand", artist.session.geometry.points("pad"))[12]
+    assert posed[1] < tip[1] - 40.0
+    artist.hands.take_up("paint")
+    artist.hands.configure(TOOLS, "paint", radius=0.04)
+    stroke = posed + np.array([[-4.0, 0.0], [0.0, 2.0], [4.0, 0.0]])
+    artist.drag(*stroke, held=("shift",))
+    assert "contact" in artist.session.document.patches, artist.hands.status
+    at = artist.pixel("hand", artist.session.geometry.points("contact"))
+    reach = 4.0 + 0.04 / world_per_pixel(artist.view, np.array([0.8, -1.0, 0.0]))
+    assert np.linalg.norm(at - posed, axis=1).max() < 1.5 * reach
 
 
 def test_a_stroke_ends_where_another_surface_hides_it() -> None:
