@@ -44,9 +44,11 @@ typecheck: $(READY)
 pytest: $(READY)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -q
 
-# The laws on examples that nobody drew before, ROUNDS times over.
+# 500 processes that edit and save killed at random, 20 workers of a batch; then the laws on examples that nobody drew
+# before, ROUNDS times over.
 ROUNDS ?= 5
 explore: $(READY)
+	CONTACT_KILLS=500 CONTACT_BATCH_KILLS=20 $(BIN)/pytest -n 2 -q tests/core/edit/test_journal.py tests/core/farm -k kill
 	for round in $$(seq $(ROUNDS)); do OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 \
 		$(BIN)/pytest -n 2 --dist loadfile -q -m hypothesis --hypothesis-profile explore || exit 1; done
 

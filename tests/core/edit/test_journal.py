@@ -26,6 +26,8 @@ from contact_core.errors import CommandRejected, FileRefused
 from contact_core.session import Session
 from contact_core.testing.random_commands import random_history
 
+KILLS = int(os.environ.get("CONTACT_KILLS", "200"))  # more of them by `make explore`
+
 posix = pytest.mark.skipif(os.name != "posix", reason="needs fork, SIGKILL and resource limits")
 
 
@@ -90,18 +92,18 @@ def killed_child(path: Path, seed: int, delay: float) -> int:
 
 
 @posix
-def test_200_kills_lose_nothing_that_was_acknowledged(tmp_path: Path) -> None:
+def test_kills_lose_nothing_that_was_acknowledged(tmp_path: Path) -> None:
     """In a process of their own, which has no thread while it forks."""
     kills = subprocess.run(
-        [sys.executable, __file__, str(tmp_path)], capture_output=True, text=True, timeout=300, check=False
+        [sys.executable, __file__, str(tmp_path)], capture_output=True, text=True, timeout=300 + KILLS, check=False
     )
     assert kills.returncode == 0, kills.stderr
 
 
-def kill_200_times(tmp_path: Path) -> None:
+def kill_many_times(tmp_path: Path) -> None:
     """After each kill the document is the acknowledged one, or that of the one action that was under way."""
     actions, history = 0, History(ContactDocument())
-    for number in range(200):
+    for number in range(KILLS):
         path = tmp_path / f"{number // 8}.json"  # eight interruptions each, recovered one upon the other
         if number % 8 == 0:
             history = History(ContactDocument())
@@ -119,7 +121,7 @@ def kill_200_times(tmp_path: Path) -> None:
         interrupt(recovered)
         history = recovered.history
         actions += acknowledged
-    assert actions > 400, "the children were killed before they did anything"
+    assert actions > 2 * KILLS, "the children were killed before they did anything"
 
 
 @posix
@@ -310,7 +312,7 @@ def test_a_newer_journal_is_refused_and_left_untouched(tmp_path: Path) -> None:
 
 
 if __name__ == "__main__":
-    kill_200_times(Path(sys.argv[1]))
+    kill_many_times(Path(sys.argv[1]))
 
 
 def test_opening_what_was_closed_in_order_costs_its_document_once(

@@ -27,6 +27,7 @@ from contact_core.farm.task import RECEIPT, Result, Task, perform, read_receipt
 from contact_core.farm.workers import KILL, LocalWorkers, NoWorkers
 from contact_core.progress import CallbackProgress
 
+KILLS = int(os.environ.get("CONTACT_BATCH_KILLS", "4"))  # more of them by `make explore`
 REPEATED = Path(__file__).with_name("conftest.py")
 
 
@@ -111,14 +112,14 @@ def _parts() -> dict[str, Any]:
 
 def test_workers_that_are_killed_lose_nothing(tmp_path: Path) -> None:
     """Killed at random moments: every job has its result, the one that it has without a death."""
-    write_jobs(tmp_path / "jobs", 6)
+    write_jobs(tmp_path / "jobs", 2 + KILLS)
     calm = run_batch([tmp_path / "jobs"], tmp_path / "calm", workers=NoWorkers())
-    assert calm.is_done and len(calm.results) == 6
+    assert calm.is_done and len(calm.results) == 2 + KILLS
     workers, over, killed = LocalWorkers(2), threading.Event(), []
 
     def kill() -> None:
         rng = random.Random(7)
-        while not over.wait(rng.uniform(0.1, 0.6)) and len(killed) < 4:
+        while not over.wait(rng.uniform(0.1, 0.6)) and len(killed) < KILLS:
             for process in rng.sample(workers.processes(), min(1, len(workers.processes()))):
                 os.kill(process, KILL)
                 killed.append(process)
