@@ -74,7 +74,7 @@ def view(
         mesh = posed[patch.surface]
         meshes.append(painted(session, name, mesh, lift, (heat or {}).get(name)))
         if axes:
-            line = on(mesh, session.geometry.axis(name).points, 1.5 * lift)
+            line = on(mesh, seen(session, name, session.geometry.axis(name).points), 1.5 * lift)
             meshes.append(PictureMesh(tube(line, 1.1 * lift), AXIS))
             starts.append(line[0])
     if focus is None:
@@ -83,6 +83,13 @@ def view(
     return Picture(
         tuple(meshes), black, camera_from=camera_from, up=up, caption=caption, focus=focus, lettering=LETTERING
     )
+
+
+def seen(session: Session, patch: str, points: SurfacePoints) -> SurfacePoints:
+    """Axis points of a patch on the mesh that is drawn, also where the contacts of its surface run on a proxy."""
+    surface = session.document.patch(patch).surface
+    has_proxy = session.document.surface(surface).proxy is not None
+    return session.geometry.seen(surface, points) if has_proxy else points
 
 
 def look_of(session: Session, surface: str) -> RGB:

@@ -23,4 +23,5 @@ ORDER = (
     "posing_methods",
     "failures",
     "crowding",
+    "proxies",
 )
