@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from contact_core.document.asset import Asset
 from contact_core.edit.operation_log import OperationLog
 from contact_core.errors import InvalidInput
 from contact_core.plugins.manager import PluginManager
@@ -52,6 +55,14 @@ class Sheet:
     def measure(self, what: str, here: str, paper: str = "") -> None:
         """A row of the table: what was measured, and what the paper says of it."""
         self.measures.append(Measure(what, paper, here))
+
+    def asset(self, name: str) -> Asset | None:
+        """A file of the real assets (`CONTACT_ASSETS`), None where it is not there."""
+        from contact_core.plugins.reading import read_asset
+
+        folder = os.environ.get("CONTACT_ASSETS")
+        found = sorted(Path(folder).rglob(name)) if folder else []
+        return read_asset(found[0], self.plugins) if found else None
 
     @contextmanager
     def counting(self, session: Session) -> Iterator[OperationLog]:
