@@ -19,8 +19,6 @@ PAPER = "Figure 10"
 Vector = tuple[float, float, float]
 # Where the palm's axis starts, which way it goes, and from where it is seen.
 RABBIT: dict[str, tuple[Vector, Vector, Vector]] = {
-    str, tuple[Vector, Vector, Vector]
-] = {  # where the palm's axis starts, which way, and from where it is seen
     "onto the head": ((0.028, 0.178, -0.024), (0.0, 0.0, 1.0), (1.0, 0.1, -0.15)),
     "onto the back": ((-0.03, 0.12, 0.04), (0.0, 0.0, -1.0), (-0.9, 1.0, 0.5)),
 }
