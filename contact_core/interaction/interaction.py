@@ -19,7 +19,7 @@ from contact_core.interaction.desk import Desk
 from contact_core.interaction.drawing import DocumentDrawing
 from contact_core.interaction.editing import EDITS
 from contact_core.interaction.events import Event, Key, Pointer
-from contact_core.interaction.live import LiveSolve
+from contact_core.interaction.live import LiveSolve, prepare
 from contact_core.interaction.overlay import NOTHING, Overlay
 from contact_core.interaction.proposing import Proposing
 from contact_core.interaction.settings import InteractionSettings, Selection
@@ -203,6 +203,17 @@ class Interaction:
             self.cancel()
             raise
         return bool(self._moved or self._parts)
+
+    def prepare(self) -> None:
+        """Build beside the window what the first drag would wait for: trees, normals and depths of all surfaces.
+
+        For front ends, when files are open. It steps back for a solve, and changes nothing but the waiting.
+        """
+        if self.worker.status is None:
+            surfaces = tuple(
+                (seen.rest, name in self.session.rigs) for name, seen in self.desk.scene.surfaces.items()
+            )
+            self.worker.begin("Prepare", lambda progress: prepare(surfaces, progress), lambda _: None)
 
     @property
     def is_due(self) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,11 +12,16 @@ from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import SetPose
+from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
+from contact_core.progress import Progress
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, contact_of, poses_of, problem_of, world_from_surface
 from contact_core.solve.body import PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.penetration import RESOLUTION
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolver, SolveOptions, SolveStatus
 from contact_core.solve.terms import PoseTerm, paper_terms
@@ -218,6 +224,25 @@ class KeptContacts:
             )
         self._kept[name] = tuple(made_of), contact
         return contact
+
+
+def prepare(surfaces: Sequence[tuple[TriangleMesh, bool]], progress: Progress) -> None:
+    """Build what meshes keep for picking and for the live solve. surfaces: each mesh, and whether it bends.
+
+    Raises Cancelled. What cannot be built is left to the solve that needs it, which says why.
+    """
+    from contact_core.geometry.distance_field import DistanceField
+
+    for number, (mesh, bends) in enumerate(surfaces):
+        if not len(mesh.faces):
+            continue
+        progress.tell(number / len(surfaces), "trees and normals")
+        Locator.of(mesh)
+        mesh.normals_at(mesh.faces[0])
+        progress.tell((number + 0.5) / len(surfaces), "depths")
+        with contextlib.suppress(InvalidInput):
+            if not bends:
+                DistanceField.of(mesh, resolution=RESOLUTION)
 
 
 def _bodies(pins: tuple[Any, ...]) -> tuple[str, ...]:

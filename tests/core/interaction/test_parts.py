@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from contact_core.document.schema import document_to_json
 from contact_core.errors import CommandRejected, ContactError, InvalidInput
+from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.raycast import Locator
 from contact_core.interaction.events import Key, Pointer
 from contact_core.interaction.live import KeptContacts
@@ -190,6 +191,20 @@ def test_a_solve_beside_the_window_is_a_ghost_until_it_is_accepted() -> None:
     artist.key("Enter")
     assert artist.session.revision == revision + 1 and "hand" in artist.session.document.poses
     assert not artist.hands.status.proposed
+
+
+def test_what_is_prepared_is_not_built_again() -> None:
+    artist = paired()
+    ball = artist.session.geometry.mesh("ball")
+    fresh = ball.with_points(1.25 * ball.points)  # a mesh that nothing was built for
+    artist.session.surfaces.add("moon", fresh, world_from_surface=shifted(0.0, 9.0, 0.0))
+    artist.hands.prepare()
+    assert artist.hands.worker.status is not None and artist.hands.worker.status.title == "Prepare"
+    solved(artist)
+    assert artist.hands.worker.status is None and not artist.hands.status.refusal
+    builds = Locator.builds
+    Locator.of(fresh)
+    assert Locator.builds == builds and fresh in DistanceField._of_mesh
 
 
 def test_a_proposal_for_another_document_is_refused_in_words() -> None:
