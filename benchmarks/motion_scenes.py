@@ -12,7 +12,7 @@ from pose_scenes import chair
 from contact_core.arrays import FloatArray
 from contact_core.document.timeline import Span
 from contact_core.geometry.raycast import Locator
-from contact_core.motion.problem import MotionProblem, MotionWeights
+from contact_core.motion.problem import MotionBounds, MotionProblem, MotionWeights
 from contact_core.motion.solving import MotionSolution, solve_motion
 from contact_core.rig.rig import Pose
 from contact_core.rig.rotations import exponential
@@ -95,8 +95,10 @@ def reach(seconds: float = 4.0, away: float = 0.31, rate: float = RATE) -> Motio
         gain = float(ease((share - 0.35) * 8.0) * (1.0 - ease((share - 0.55) * 8.0)))
         problems.append(replace(grip, contacts=tuple(replace(c, gain=gain) for c in grip.contacts)))
     return MotionProblem(
-        tuple(frames.astype(float)), tuple(problems), rate, pins={0.0: resting, float(frames[-1]): resting}
-    )
+        tuple(frames.astype(float)), tuple(problems), rate,
+        bounds=MotionBounds(depth=0.003 * grip.manipulator_length),
+        pins={0.0: resting, float(frames[-1]): resting},
+    )  # fmt: skip
 
 
 GRIPS = {  # how far each fingertip's contact is turned over the ball, rad: thumb and fingers in their order

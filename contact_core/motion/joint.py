@@ -5,6 +5,7 @@ E = sum_f T_f E_f(theta_f)                          the frames' own terms, T_f t
   + w_k sum_f T |slip_f / T|^2                      skate, seen from the objects (`skate`)
   + w_r sum_f T_f |theta_f - reference|^2           only with a reference
   + sum_f T_f B |what exceeds a bound|^2            B rises where a bound is exceeded (`MotionBounds`)
+  + walls at frames in transit                      dearer while skin is deeper than its bound
 
 All sums are integrals over seconds, so the rate of the frames does not matter. Steps, limits and damping are those
 of the solver of single poses (`solve.levenberg_marquardt`); a step costs n d^3.
@@ -13,17 +14,22 @@ of the solver of single poses (`solve.levenberg_marquardt`); a step costs n d^3.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray
 from contact_core.motion.band import BlockBand, bounded_minimum
+from contact_core.motion.depth import HELD, SAMPLES, deepest_skin
 from contact_core.motion.problem import MotionProblem
 from contact_core.motion.skate import SkateEnergy
 from contact_core.motion.steps import Clock, Steps
+from contact_core.rig.rig import Rig
+from contact_core.solve.penetration import Allowance, NoDeeperTerm, thinned
 from contact_core.solve.state import PoseState
 
+FIRST_WALL = 8.0  # weight of depth beyond its bound
+INSIDE = 0.9  # of the bound: where walls stand, for they see the solid on a grid
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e8
 FIRST_BOUND_WEIGHT = 0.1  # times the weight of accelerations, or of 1 where those are free
@@ -33,9 +39,10 @@ class JointObjective:
     """E of a motion. evaluations: how many single frames were evaluated, models: of how many a model was made."""
 
     def __init__(self, motion: MotionProblem) -> None:
-        self.motion, self.problems = motion, motion.posed
+        self.motion, self.problems = motion, list(motion.posed)
         self.clock, self.chart = motion.clock, motion.chart
-        self.skate = SkateEnergy(self.problems, self.clock.gaps, motion.weights.skate)
+        self.walls = np.zeros(len(motion.frames))  # per frame, what skin that is too deep costs
+        self.skate = SkateEnergy(motion.posed, self.clock.gaps, motion.weights.skate)
         self.reference = motion.reference_thetas
         self.reference_acceleration: FloatArray | float = 0.0
         if self.reference is not None and len(motion.frames) > 2:
@@ -123,6 +130,26 @@ class JointObjective:
             raised |= bool(beyond.any())
         return raised
 
+    def raise_walls(self, states: list[PoseState], tolerance: float) -> bool:
+        """Make depth dearer at frames in transit at which skin is deeper than its bound by more than a share
+        `tolerance`; whether any is."""
+        bound, raised = self.motion.bounds.depth, False
+        if not np.isfinite(bound):
+            return False
+        for row, (posed, state) in enumerate(zip(self.motion.posed, states, strict=True)):
+            held = any(contact.gain >= HELD for contact in posed.contacts) or self.motion.pinned[row].all()
+            if held or deepest_skin(posed, state) <= bound * (1.0 + tolerance):
+                continue
+            self.walls[row], raised = max(8.0 * self.walls[row], FIRST_WALL), True
+            allowed = {
+                body.name: _even_allowance(body.rig, INSIDE * bound / posed.unit)
+                for body in posed.bodies
+                if len(body.rig.joints) > 1 and body.black_box is None
+            }
+            wall = NoDeeperTerm(allowed, weight=self.walls[row])
+            self.problems[row] = replace(posed, terms=(*posed.terms, wall))
+        return raised
+
     def _can_move(self, rows: int) -> BoolArray:
         """(rows, d) whether any frame that a speed or acceleration spans may move."""
         free = ~self.motion.pinned
@@ -147,6 +174,12 @@ class JointObjective:
         steps.add_curvature(weights, weights[:0], model)
         gradient += slopes[1::2]
         matrix.own += model.own[1::2]
+
+
+def _even_allowance(rig: Rig, depth: float) -> Allowance:
+    """Every vertex that stands for the skin may be so deep, in l."""
+    vertices, _ = thinned(rig.surface, SAMPLES)
+    return Allowance(vertices, np.full(len(vertices), depth))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +258,7 @@ class JointDescent:
 
     def restart(self) -> None:
         """Go on after the objective has changed."""
+        self.states = self.objective.states(self.best)
         self.value = self.objective.value(self.states)
         self.damping, self.growth, self.settled = FIRST_DAMPING, 2.0, False
 

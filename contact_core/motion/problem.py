@@ -48,16 +48,18 @@ class MotionBounds:
     """The fastest that anything may move; infinite: no bound.
 
     turning_speed, turning_acceleration: of every angle (of a freely turning ball: of each component of its angular
-    velocity), rad/s and rad/s^2. travel_speed, travel_acceleration: of every translation, world units/s and /s^2.
+    velocity), rad/s and rad/s^2. travel_speed, travel_acceleration: of every translation, world units/s
+    and /s^2. depth: how deep any skin may be at frames at which no contact is fully on, world units.
     """
 
     turning_speed: float = math.inf
     turning_acceleration: float = math.inf
     travel_speed: float = math.inf
     travel_acceleration: float = math.inf
+    depth: float = math.inf
 
     def __post_init__(self) -> None:
-        for name in ("turning_speed", "turning_acceleration", "travel_speed", "travel_acceleration"):
+        for name in ("turning_speed", "turning_acceleration", "travel_speed", "travel_acceleration", "depth"):
             value = getattr(self, name)
             if not value > 0.0:
                 raise InvalidInput(f"the bound {name} of a motion must be above 0, but got {value}.")

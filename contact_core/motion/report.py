@@ -9,16 +9,12 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
-from contact_core.geometry.transform import transform_points
+from contact_core.motion.depth import HELD, deepest_skin
 from contact_core.motion.problem import MotionProblem
 from contact_core.motion.reduction import Reduction
 from contact_core.motion.skate import ObjectGaps
-from contact_core.solve.penetration import Solid, Solids, solids_of, thinned
-from contact_core.solve.problem import PoseProblem
+from contact_core.solve.penetration import Solids
 from contact_core.solve.state import PoseState
-
-HELD = 0.99  # gain from which a contact counts as on
-SAMPLES = 1500  # skin vertices whose depth is measured
 
 
 @dataclass(frozen=True)
@@ -146,26 +142,8 @@ def _depths(motion: MotionProblem, states: Sequence[PoseState], solids: Solids |
     """(n,) how deep the deepest skin vertex is at each frame, world units."""
     result = np.zeros(len(states))
     for row, (problem, state) in enumerate(zip(motion.posed, states, strict=True)):
-        for name, solid in solids_of(problem, solids).items():
-            result[row] = max(result[row], _deepest(problem, state, name, solid))
+        result[row] = deepest_skin(problem, state, solids)
     return result
-
-
-def _deepest(problem: PoseProblem, state: PoseState, name: str, solid: Solid) -> float:
-    """Of all skinned bodies in one solid, world units."""
-    from contact_core.rig.skinning import vertex_track
-
-    deepest, into = 0.0, solid.surface_from_world(state)
-    for index, body in enumerate(problem.bodies):
-        if body.name == name or len(body.rig.joints) < 2:
-            continue
-        vertices, _ = thinned(body.rig.surface, SAMPLES)
-        world = state.vectors(vertex_track(body.rig, vertices, int(problem.bone_offsets[index])))
-        points = transform_points(into, world)
-        near = ((points > solid.low) & (points < solid.high)).all(axis=1)
-        if near.any():
-            deepest = max(deepest, solid.scale * float(solid.depths(points[near]).max()))
-    return deepest
 
 
 def _largest_step(motion: MotionProblem, states: Sequence[PoseState]) -> tuple[float, float, float]:

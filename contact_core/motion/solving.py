@@ -141,7 +141,9 @@ class _Solve:
     def _joint(self, descent: JointDescent) -> SolveStatus:
         settled = descent.run(self.options.max_iterations)
         for _ in range(BOUND_ROUNDS):
-            if not self.objective.raise_bounds(descent.states, self.options.bound_tolerance):
+            tolerance = self.options.bound_tolerance
+            faster = self.objective.raise_bounds(descent.states, tolerance)
+            if not self.objective.raise_walls(descent.states, tolerance) and not faster:
                 break
             descent.restart()
             settled = descent.run(self.options.max_iterations)

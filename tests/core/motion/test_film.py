@@ -13,7 +13,7 @@ from contact_core.document.timeline import PoseKey, address
 from contact_core.edit.commands import SetKeys
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.motion.detection import DetectionOptions
-from contact_core.motion.problem import MotionWeights
+from contact_core.motion.problem import MotionBounds, MotionWeights
 from contact_core.motion.reduction import skin_errors
 from contact_core.motion.report import motion_report
 from contact_core.progress import CallbackProgress
@@ -324,3 +324,13 @@ def test_a_clip_in_a_scene_is_repaired_at_its_own_keys() -> None:
             wanted = found.motion.by_frame[int(frame)]["arm"]
             assert np.abs(host.read_pose("arm", frame).local - wanted.local).max() < 1e-5
         assert np.abs(host.read_pose("arm", 60.0).local - rig.rest_local).max() < 1e-5
+
+
+def test_skin_in_transit_keeps_to_its_depth(session: Session) -> None:
+    """What is too deep at frames without a contact that is fully on gets a wall, dearer and dearer."""
+    free = solved(session).report()
+    bound = 0.5 * free.penetration_transit
+    assert bound > 0.0
+    bounded = solved(session, motion=MotionSettings(bounds=MotionBounds(depth=bound))).report()
+    assert bounded.penetration_transit <= 1.05 * bound
+    assert bounded.pairs["touch"].mean < 1.2 * free.pairs["touch"].mean  # what is held stays
