@@ -233,6 +233,25 @@ def test_patches_stay_where_they_are_when_a_proxy_comes_and_goes() -> None:
             session.surfaces.remove_proxy("thing")
 
 
+def test_another_shape_gets_another_proxy() -> None:
+    mesh = torus(60, 30)
+    longer = mesh.with_points(mesh.points * np.array([1.3, 1.0, 1.0]))
+    with session_on(mesh) as session:
+        session.surfaces.add_proxy("thing", offset=0.03)
+        session.patches.brush("disk", "spot", surface="thing", at=[[1.4, 0.0, 0.0]], radius=0.3)
+        before, document = session.geometry.points("spot").positions(mesh), session.document
+        session.surfaces.add("thing", longer)
+        proxies = [d.surface("thing").proxy for d in (document, session.document)]
+        assert proxies[0] is not None and proxies[1] is not None and proxies[0].digest != proxies[1].digest
+        moved = session.geometry.points("spot").positions(longer) - before
+        assert 0.2 < np.linalg.norm(moved, axis=1).mean() < 0.6
+    with Session(document) as elsewhere:
+        with pytest.raises(InvalidInput, match="old_mesh"):
+            elsewhere.surfaces.add("thing", longer)
+        elsewhere.surfaces.rebind("thing", longer, old_mesh=mesh)
+        assert len(elsewhere.geometry.points("spot")) == len(before)
+
+
 def test_a_document_opened_elsewhere_has_the_same_contacts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = broken("fin")
     with session_on(mesh) as session:

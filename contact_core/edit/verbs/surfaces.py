@@ -74,12 +74,21 @@ class Surfaces(VerbGroup):
         if known is None:
             self._editor.do(AddSurface(wanted), origin="asset")
         elif known.digest != wanted.digest and known.proxy is not None:
-            self.rebind(name, mesh)
+            self._reshape(known, mesh)
         elif known.digest != wanted.digest:
             tracks = placed_tracks(self._editor, name, mesh, lambda root: root)
             same = replace(known, digest=wanted.digest)
             self._editor.do(RebindSurface(same, FrozenMap(), (), tracks), origin="asset")
         return self._document.surface(name)
+
+    def _reshape(self, known: Surface, mesh: TriangleMesh) -> None:
+        """The same triangles in another shape, which need another proxy."""
+        if known.digest not in self._editor.derived.known_meshes:
+            raise InvalidInput(
+                f"{known.name!r} has another shape now than when its proxy was made: give the one before,"
+                f" surfaces.rebind({known.name!r}, mesh, old_mesh=...)."
+            )
+        self.rebind(known.name, mesh)
 
     def rebind(self, name: str, mesh: TriangleMesh, *, old_mesh: TriangleMesh | None = None) -> RebindReport:
         """Put the contacts of a surface onto another mesh under the same name, and say how far they moved.
