@@ -76,7 +76,7 @@ class DocumentParts:
         for field in _FIELDS:
             before, after = getattr(self.document, field), getattr(document, field)
             for name in _differing(before, after):
-                old, new = (_pieces(field, name, items) for items in (before, after))
+                old, new = _pieces(field, name, before, after), _pieces(field, name, after, before)
                 removed += [_key(field, name, piece) for piece in old if piece not in new]
                 for piece, made in new.items():
                     if made.shares(old.get(piece)):
@@ -105,10 +105,11 @@ class _Piece:
         return other is not None and all(map(operator.is_, self.held, other.held))
 
 
-def _pieces(field: str, name: str, items: Mapping[str, Any]) -> dict[str, _Piece]:
+def _pieces(field: str, name: str, items: Mapping[str, Any], beside: Mapping[str, Any]) -> dict[str, _Piece]:
     """The pieces of a value, none where it is not there: a value is one.
 
-    But bending the axis of a shape does not write its points again, nor setting a key the others of its track.
+    But bending the axis of a shape does not write its points again, nor setting a key the others of its track:
+    those that the value of that name in `beside` has as well are left out.
     """
     if name not in items:
         return {}
@@ -119,7 +120,10 @@ def _pieces(field: str, name: str, items: Mapping[str, Any]) -> dict[str, _Piece
             for piece, taken in _SHAPE_PIECES.items()
         }
     if isinstance(value, Track):
-        return {repr(float(key.frame)): _Piece((key,), partial(_of_track, key)) for key in value.keys}
+        other = beside.get(name)
+        shared = set(map(id, other.keys)) if isinstance(other, Track) else set[int]()
+        own = [key for key in value.keys if id(key) not in shared]
+        return {repr(float(key.frame)): _Piece((key,), partial(_of_track, key)) for key in own}
     return {"": _Piece((value,), partial(to_json, value, _ITEM_TYPES[field]))}
 
 
@@ -167,7 +171,7 @@ def _document_in(parts: Mapping[str, str], schema: int, source: str) -> ContactD
         _key(field, name, piece)
         for field in _FIELDS
         for name in getattr(document, field)
-        for piece in _pieces(field, name, getattr(document, field))
+        for piece in _pieces(field, name, getattr(document, field), {})
     }
     if wanted != set(parts):
         odd = sorted(wanted ^ set(parts))[0]
