@@ -88,10 +88,11 @@ def propose_motion(
     revision: int,
     settings: SolveSettings,
     motion: MotionSettings,
-    scene_keys: Callable[[str], tuple[float, ...]] = lambda name: (),
+    scene_keys: Callable[[str], tuple[float, ...]] | None = None,
 ) -> MotionProposal:
     """The motion through frames. timed: the document with its tracks. frame: which one a ghost shows. draft_at: the
-    document at a frame, as the scene has it there. scene_keys: where the scene keys the rig of a surface already.
+    document at a frame, as the scene has it there. scene_keys: where the scene keys the rig of a surface already;
+    None without a scene, which then gets no keys.
 
     Raises InvalidInput without a pair of a rig that can be posed, Cancelled where nothing was solved.
     """
@@ -109,7 +110,7 @@ class _Motion:
         plugins: PluginManager,
         settings: SolveSettings,
         motion: MotionSettings,
-        scene_keys: Callable[[str], tuple[float, ...]],
+        scene_keys: Callable[[str], tuple[float, ...]] | None,
     ) -> None:
         self.timed, self.draft_at, self.plugins, self.scene_keys = timed, draft_at, plugins, scene_keys
         self.settings, self.motion = settings, motion
@@ -136,7 +137,6 @@ class _Motion:
             raise Cancelled("it was cancelled before the first frame was solved; nothing is proposed.")
         poses = {name: self._poses(solution, name) for name in self.posed}
         cubic = {name: self._reduced(name, poses[name], "cubic") for name in self.posed}
-        linear = {name: self._reduced(name, poses[name], "linear") for name in self.posed}
         command = self._command({name: done.keys for name, done in cubic.items()})
         by_frame = _solutions(solution)
         return MotionProposal(
@@ -145,7 +145,7 @@ class _Motion:
             revision=revision,
             before=by_frame[-1],
             after=by_frame[-1],
-            keys=self._scene_keys(poses, {name: done.keys for name, done in linear.items()}),
+            keys={} if self.scene_keys is None else self._scene_keys(poses, self.scene_keys),
             solutions=tuple(by_frame[row] for row, f in enumerate(self.frames) if self._is_asked(f)),
             motion=solution,
             reductions=cubic,
@@ -272,14 +272,15 @@ class _Motion:
         return tuple(poses)
 
     def _scene_keys(
-        self, poses: Mapping[str, tuple[Pose, ...]], keys: Mapping[str, PoseKeys]
+        self, poses: Mapping[str, tuple[Pose, ...]], known: Callable[[str], tuple[float, ...]]
     ) -> dict[float, dict[str, Pose]]:
         """What the scene gets, by frame: the keys, and the pose at each key that it has within the range already,
         or what lies between would stay as it was."""
         result: dict[float, dict[str, Pose]] = {}
-        for name, found in keys.items():
+        for name in self.posed:
+            found = self._reduced(name, poses[name], "linear").keys
             solved = dict(zip(self.frames, poses[name], strict=True))
-            there = {f for f in self.scene_keys(name) if self.frames[0] <= f <= self.frames[-1]}
+            there = {f for f in known(name) if self.frames[0] <= f <= self.frames[-1]}
             for frame in {*found.frames, *there}:
                 pose = solved[frame] if frame in solved else found.at(self.rigs[name], frame)
                 result.setdefault(frame, {})[name] = pose

@@ -126,7 +126,7 @@ class ProposingSession(ABC):
         else:
             found = propose_motion(
                 self.timed_document, self.timeline.frame, frames, self._draft, self.plugins, self.revision,
-                settings, motion or MotionSettings(), self.binding.pose_keys,
+                settings, motion or MotionSettings(), self.binding.pose_keys if self.binding.has_scene else None,
             )  # fmt: skip
         self.show_ghost(found)
         return found

@@ -54,6 +54,11 @@ class Binding:
         self._evaluated: dict[str, HostRig | None] = {}
 
     @property
+    def has_scene(self) -> bool:
+        """Whether there is a scene to bind to."""
+        return self._host is not None
+
+    @property
     def key(self) -> str:
         """The namespace of the document's extras that remembers the object of each surface: "host.usd"."""
         return "host" if self._host is None else f"host.{self._host.name}"
