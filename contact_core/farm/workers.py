@@ -16,7 +16,7 @@ import time
 from abc import abstractmethod
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Protocol
 
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
@@ -146,10 +146,25 @@ class LocalWorkers(Workers):
         return [slot.process for slot in self._slots if slot.process is not None]
 
 
+class _Spawning(SpawnContext):
+    """Spawns, not forks: a fork of a process that has threads, as numpy and hosts have, may hang. It keeps what it
+    started, so that a process can be ended before it has said its id."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.started: list[SpawnProcess] = []
+        self.Process = self._start  # type: ignore[misc, assignment]  # pools make theirs by it
+
+    def _start(self, *arguments: Any, **more: Any) -> SpawnProcess:
+        self.started.append(SpawnProcess(*arguments, **more))
+        return self.started[-1]
+
+
 class _Slot:
     """One worker: a pool of one process, made when there is work, and made again after it died."""
 
     def __init__(self) -> None:
+        self._context = _Spawning()
         self._pool: ProcessPoolExecutor | None = None
         self._hello: Future[int] | None = None
 
@@ -178,15 +193,15 @@ class _Slot:
 
     def _open(self) -> ProcessPoolExecutor:
         if self._pool is None:
-            # spawn: a fork of a process that has threads, as numpy and hosts have, may hang
-            self._pool = ProcessPoolExecutor(1, get_context("spawn"), initializer=_begin)
+            self._context = _Spawning()
+            self._pool = ProcessPoolExecutor(1, self._context, initializer=_begin)
             self._hello = self._pool.submit(_warm)
         return self._pool
 
     def kill(self) -> None:
-        if self.process is not None:
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.kill(self.process, KILL)
+        for process in self._context.started:
+            with contextlib.suppress(ValueError):  # it was closed: it has ended
+                process.kill()
 
     def end(self) -> None:
         if self._pool is not None:

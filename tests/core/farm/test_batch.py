@@ -203,6 +203,14 @@ def test_cancelling_ends_the_workers_and_reports_what_there_is(jobs: Path) -> No
     assert sum(facts["counts"][state] for state in ("done", "same", "failed", "stopped")) == 4
 
 
+def test_a_worker_is_stopped_before_it_has_begun(jobs: Path) -> None:
+    workers = LocalWorkers(1)
+    future = workers.submit(_task(jobs / "job000.json", jobs / "out"))
+    workers.stop()
+    assert future.cancelled() or future.exception() is not None
+    assert read_receipt(jobs / "out") is None and workers.processes() == []
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_ctrl_c_leaves_a_report_and_the_code_of_an_interrupt(jobs: Path) -> None:
     command = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import replace
 from functools import cache
@@ -15,10 +16,12 @@ from contact_builtins.demos import demo_names, demo_recipe
 from contact_core.document.schema import parse_document
 from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInput
 from contact_core.geometry.hull import convex_hull
+from contact_core.job.inputs import inputs_of
 from contact_core.job.job import Job
 from contact_core.job.outputs import write_outputs
 from contact_core.job.points import painted_points
 from contact_core.job.recipe import AssetSource, PatchSpec, PointSpec, Recipe, RootSpec
+from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import perform, run, target
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import CallbackProgress
@@ -133,6 +136,8 @@ def test_a_job_writes_its_files_and_they_can_be_read_again(tmp_path: Path) -> No
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert report == json.loads(json.dumps(dict(result.report)))
     assert report["renderer"] == "sketch" and any("libEGL is missing" in note for note in report["notes"])
+    assert report["solver"] == "levenberg-marquardt" and report["inputs"]["recipe"]["name"] == "alien"
+    assert "sample" in report["inputs"]["manipulator"] and "sample" in report["inputs"]["object"]
     assert set(report["seconds"]) >= {"read", "parameterize", "transfer", "solve", "render"}
     assert {"dofs", "iterations", "status", "verdict", "definitions"} <= set(report)
     assert set(report["definitions"]) >= set(report["limits"])
@@ -409,3 +414,23 @@ def test_two_objects_are_held_by_one_hand() -> None:
         "upper", "lower",
     }  # fmt: skip
     assert job.metrics["contacts"] == demo("alien").metrics["contacts"]
+
+
+def test_the_report_names_its_inputs_by_their_content(tmp_path: Path) -> None:
+    """Another file, or another word in the recipe, is another digest; a remark in the recipe is not."""
+    text = (
+        'schema = 1\nname = "x"\n[manipulator]\nfile = "hand.glb"\n[object]\nfile = "thing.obj"\n'
+        '[[patch]]\nname = "tip"\nvertices = [1]\n'
+    )
+    (tmp_path / "hand.glb").write_bytes(b"a hand")
+    (tmp_path / "thing.obj").write_bytes(b"a thing")
+
+    def found(text: str = text) -> dict[str, dict[str, str]]:
+        return inputs_of(parse_recipe(text, name="x.toml", folder=tmp_path))
+
+    first = found()
+    assert first["object"] == {"file": "thing.obj", "sha256": hashlib.sha256(b"a thing").hexdigest()}
+    assert found("# a remark\n" + text) == first
+    assert found(text.replace("[1]", "[2]"))["recipe"] != first["recipe"]
+    (tmp_path / "hand.glb").write_bytes(b"another")
+    assert found()["manipulator"] != first["manipulator"] and found()["object"] == first["object"]
