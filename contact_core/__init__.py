@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from contact_core.opening import open as open  # noqa: A004 - said as `contact.open`
     from contact_core.plugins import hookimpl as hookimpl
     from contact_core.plugins.manager import PluginManager as PluginManager
+    from contact_core.plugins.reading import read_asset as read_asset
     from contact_core.progress import CallbackProgress as CallbackProgress
     from contact_core.progress import Progress as Progress
     from contact_core.proposals.proposal import Proposal as Proposal
@@ -76,6 +77,7 @@ _HOME_OF_NAME = {
     "hookimpl": "plugins",
     "new": "opening",
     "open": "opening",
+    "read_asset": "plugins.reading",
 }
 
 __all__ = ["__version__", *sorted(_HOME_OF_NAME)]

@@ -81,6 +81,7 @@ class Session(GraspingSession):
         self._listeners.listen(self._tell_plugins)
         self._file: OpenDocument | None = None
         self._opening_notes: tuple[str, ...] = ()
+        self._ended: str | None = None  # why nothing can be edited any more
         self._open_edits = OpenEdits()
         self._plugins: PluginManager | None = None if isinstance(plugins, Iterable) else plugins
         self._plugin_arguments = (tuple(plugins) if isinstance(plugins, Iterable) else (), discover)
@@ -201,6 +202,8 @@ class Session(GraspingSession):
         In a host that keeps documents, the host's own file is written instead, where it came from or at a path with
         one of the host's suffixes, and None is returned. Raises FileRefused; what is on the disk is then untouched.
         """
+        if self._ended is not None:
+            raise FileRefused(self._ended)
         if self._file is None and self._host_link is not None and self._host_link.saves(path):
             with self._open_edits.alone():
                 self._host_link.save(path)
@@ -234,6 +237,14 @@ class Session(GraspingSession):
             self.host, self._binding = None, None  # the scene ends with its last holder
             if self._file is not None:
                 self._file.close(in_order=discard or self.history.is_clean)
+
+    def end(self, reason: str) -> None:
+        """Close, and refuse what comes with this sentence: the scene that was edited is there no more. What was
+        not saved goes with the scene, as all else in it; what is under way is abandoned."""
+        with self._open_edits.alone():
+            self._open_edits.abandon()
+            self._ended = reason
+        self.close(discard=True)
 
     def __enter__(self) -> Session:
         return self
@@ -317,6 +328,7 @@ class Session(GraspingSession):
             host_keeps_steps = self._host_link is not None and self._host_link.has_undo
             if self._host_link is not None:
                 self._host_link.check_unchanged()
+            self._check_not_ended()  # asking the host, it may have found that the scene is gone
             step = self.history.prepare(command, origin, merge=merge and not host_keeps_steps)
             before = self.history.document
             with self._in_host(step.command.label(), before, step.after, step.revision):
@@ -457,9 +469,14 @@ class Session(GraspingSession):
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _check_writable(self) -> None:
+        self._check_not_ended()
         if self._file is not None and self._file.read_only is not None:
             raise CommandRejected(self._file.read_only)
         self._open_edits.check_no_stroke()
+
+    def _check_not_ended(self) -> None:
+        if self._ended is not None:
+            raise CommandRejected(self._ended)
 
     def _check_idle(self) -> None:
         self._check_writable()

@@ -65,7 +65,7 @@ def environment(blender: str = DEFAULT) -> Path:
             _installing(_interpreter(PYTHON_OF[blender]), "-m", "venv", str(folder))
         pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
         try:
-            _installing(str(python), *pip, f"bpy=={blender}.*", "--editable", f"{REPOSITORY}[testing]")
+            _installing(str(python), *pip, f"bpy=={blender}.*", "--editable", f"{REPOSITORY}[testing,samples]")
         except Unavailable as reason:
             if not ready.is_file():  # else an older one serves, without a network too
                 raise Unavailable(f"bpy {blender} could not be installed: {reason}") from reason

@@ -12,11 +12,13 @@ from contact_core.plugins.registry import FORMATS, SAMPLES
 SAMPLE = "sample:"  # what the name of a built-in sample begins with where a file could be named, too
 
 
-def read_asset(source: Path | str, plugins: PluginManager, *, sidecar: Path | None = None) -> Asset:
+def read_asset(source: Path | str, plugins: PluginManager | None = None, *, sidecar: Path | None = None) -> Asset:
     """The asset in a file, read by the format that its suffix names, or a sample: "sample:human".
 
-    Raises FileRefused, and InvalidInput for a sample that is not there.
+    plugins: by default those that are installed. Raises FileRefused, and InvalidInput for a sample that there is
+    not.
     """
+    plugins = plugins or PluginManager()
     if isinstance(source, str) and source.startswith(SAMPLE):
         return plugins.get(SAMPLES, source.removeprefix(SAMPLE)).build()
     path = Path(source)

@@ -212,6 +212,16 @@ class Undo(HostAdapter, Protocol):
 
 
 @runtime_checkable
+class SceneLifetime(HostAdapter, Protocol):
+    """A host that outlives its scene: the user opens another file, begins a new one, reverts, or takes it out."""
+
+    @abstractmethod
+    def on_close(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener` when the scene goes, while it can still be read; the returned function stops that."""
+        ...
+
+
+@runtime_checkable
 class SelectionReading(HostAdapter, Protocol):
     """What the user selected in the host becomes a patch."""
 

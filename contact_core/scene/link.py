@@ -12,7 +12,7 @@ from contact_core.document.parts import NO_PARTS, DocumentParts
 from contact_core.document.schema import VERSION
 from contact_core.edit.history import History
 from contact_core.errors import CommandRejected, FileRefused
-from contact_core.scene.host import DocumentStamp, DocumentStorage, HostAdapter, Undo
+from contact_core.scene.host import DocumentStamp, DocumentStorage, HostAdapter, SceneLifetime, Undo
 
 
 class FollowingSession(Protocol):
@@ -28,6 +28,8 @@ class FollowingSession(Protocol):
 
     def adopt(self, history: History) -> None: ...
 
+    def end(self, reason: str) -> None: ...
+
 
 class HostLink:
     """Keeps a host and a session in step, by what the host can do: storing documents, undo, neither.
@@ -42,16 +44,24 @@ class HostLink:
         self._session = session
         self._storage = host if isinstance(host, DocumentStorage) else None
         self._undo = host if isinstance(host, Undo) and self._storage is not None else None
-        self._stop: Callable[[], None] | None = None
+        self._lifetime = host if isinstance(host, SceneLifetime) else None
+        self._stops: list[Callable[[], None]] = []
         self._began_in_host = False  # the history starts at a document that the host stored
         self._digests: dict[int, str] = {}  # by revision, of what was stored or found in the host
         self._found = NO_PARTS  # of the document that was found in the host last
         self._parts = NO_PARTS  # of the document that was stored or found last
 
     def listen(self) -> None:
-        """Follow the host's undo from now on, until `close`."""
+        """Follow the host's undo, and end with its scene, from now on until `close`."""
         if self._undo is not None:
-            self._stop = self._undo.on_undo(self.follow)
+            self._stops.append(self._undo.on_undo(self.follow))
+        if self._lifetime is not None:
+            self._stops.append(self._lifetime.on_close(self._scene_closed))
+
+    def _scene_closed(self) -> None:
+        self._session.end(
+            "this session has ended with its scene, which was closed: begin one in the scene now open."
+        )
 
     @property
     def has_undo(self) -> bool:
@@ -193,6 +203,6 @@ class HostLink:
 
     def close(self) -> None:
         """Stop listening to the host."""
-        if self._stop is not None:
-            self._stop()
-            self._stop = None
+        for stop in self._stops:
+            stop()
+        self._stops.clear()

@@ -31,6 +31,7 @@ from contact_core.scene.host import (
     PoseWriting,
     ProgressDisplay,
     RigReading,
+    SceneLifetime,
     SceneObject,
     SceneReading,
     SceneSpace,
@@ -53,6 +54,7 @@ class MemoryHost(
     PoseWriting,
     DocumentStorage,
     Undo,
+    SceneLifetime,
     SelectionReading,
     Display,
     Picking,
@@ -76,6 +78,7 @@ class MemoryHost(
         self._at = 0
         self._depth = 0  # of open steps
         self._listeners: list[Callable[[], None]] = []
+        self._closing: list[Callable[[], None]] = []
         self.picture: Picture | None = None
         self.told: list[tuple[float | None, str]] = []  # progress so far
         self._cancel_asked = False
@@ -230,6 +233,17 @@ class MemoryHost(
                 self._listeners.remove(listener)
 
         return stop
+
+    def on_close(self, listener: Callable[[], None]) -> Callable[[], None]:
+        self._closing.append(listener)
+        return lambda: self._closing.remove(listener) if listener in self._closing else None
+
+    def replace_scene(self, scene: MemoryScene) -> None:
+        """Close the scene and go on with another, as File > Open does."""
+        for listener in tuple(self._closing):
+            listener()
+        self._scene = scene
+        self._states, self._at = [("open", scene)], 0
 
     # Selections, display, picking, progress
 

@@ -214,3 +214,17 @@ def test_a_renamed_surface_keeps_its_object_and_its_rig_through_undo_and_reopeni
         session.redo()
     with contact.Session(host=host) as again:
         assert again.binding.surfaces["limb"].object_id == object_id and not again.notes
+
+
+def test_a_session_ends_with_its_scene() -> None:
+    host = scene()
+    session = contact.Session(host=host, objects=None)
+    paint(session)
+    host.replace_scene(contact.MemoryHost()._scene)
+    with pytest.raises(contact.CommandRejected, match="ended with its scene"):
+        session.patches.rotate("tip", 0.1)
+    with pytest.raises(contact.CommandRejected, match="ended with its scene"), session.stroke():
+        pass
+    assert host.stored_stamp() is None and "tip" in session.document.patches  # it can still be read
+    with contact.Session(host=host, objects=None) as fresh:
+        assert not fresh.document.patches

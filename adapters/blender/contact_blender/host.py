@@ -15,6 +15,7 @@ from contact_blender import mesh as meshes
 from contact_blender import rig as rigs
 from contact_blender.compat import bpy
 from contact_blender.ids import ObjectIds
+from contact_blender.lifetime import SceneEnd
 from contact_blender.undo import UndoBridge
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
@@ -29,6 +30,7 @@ from contact_core.scene.host import (
     PoseWriting,
     ProgressDisplay,
     RigReading,
+    SceneLifetime,
     SceneObject,
     SceneReading,
     SceneSpace,
@@ -61,6 +63,7 @@ class BlenderHost(
     PoseWriting,
     DocumentStorage,
     Undo,
+    SceneLifetime,
     SelectionReading,
     Display,
     ProgressDisplay,
@@ -88,6 +91,8 @@ class BlenderHost(
         self._cancel_asked = False
         self._shows_progress = False
         self._known: dict[str, _KnownRig] = {}
+        self._scene_uid = int(bpy.context.scene.session_uid)
+        self._lifetime = SceneEnd()
         storage.restore_ids(bpy.context.scene, self._ids)
 
     @classmethod
@@ -96,7 +101,7 @@ class BlenderHost(
         return cls(path)
 
     def space(self) -> SceneSpace:
-        scene = bpy.context.scene
+        scene = self._scene
         rate = scene.render.fps / scene.render.fps_base
         silenced = bpy.app.autoexec_fail_message if bpy.app.autoexec_fail else ""
         note = f"Blender did not run the scripts of this file ({silenced}), so what they drive stands still."
@@ -107,7 +112,7 @@ class BlenderHost(
     def objects(self) -> tuple[SceneObject, ...]:
         return tuple(
             SceneObject(self._ids.id_of(each), str(each.name), "rig" if rigs.armature_of(each) else "surface")
-            for each in bpy.context.scene.objects
+            for each in self._scene.objects
             if each.type == "MESH"
         )
 
@@ -198,15 +203,15 @@ class BlenderHost(
     # The document
 
     def stored_stamp(self) -> DocumentStamp | None:
-        return storage.read_stamp(bpy.context.scene)
+        return storage.read_stamp(self._scene)
 
     def stored_document(self) -> StoredDocument | None:
-        return storage.read(bpy.context.scene)
+        return storage.read(self._scene)
 
     def store_document(self, stamp: DocumentStamp, put: Mapping[str, str], remove: Iterable[str] = ()) -> None:
         with self.step("Contact document"):
-            take_back = storage.write(bpy.context.scene, stamp, put, remove, self._ids.pairs())
-            self._undo.wrote(lambda: take_back(bpy.context.scene, self._ids))
+            take_back = storage.write(self._scene, stamp, put, remove, self._ids.pairs())
+            self._undo.wrote(lambda: take_back(self._scene, self._ids))
 
     def save(self, path: Path | None = None) -> None:
         target = str(bpy.data.filepath) if path is None else str(Path(path).resolve())
@@ -232,6 +237,9 @@ class BlenderHost(
 
     def on_undo(self, listener: Callable[[], None]) -> Callable[[], None]:
         return self._undo.on_undo(listener)
+
+    def on_close(self, listener: Callable[[], None]) -> Callable[[], None]:
+        return self._lifetime.on_close(listener)
 
     # Selections, display and progress
 
@@ -276,6 +284,17 @@ class BlenderHost(
         self._cancel_asked = True
 
     # Resolving: for the length of one call
+
+    @property
+    def _scene(self) -> Any:
+        """The scene of this host, which need not be the one that the window shows. Where it was removed, or another
+        file is open, its sessions end, and the host goes on with the scene that is open."""
+        for scene in bpy.data.scenes:
+            if scene.session_uid == self._scene_uid:
+                return scene
+        self._lifetime.closed()
+        self._scene_uid = int(bpy.context.scene.session_uid)
+        return bpy.context.scene
 
     def _mesh_object(self, object_id: str) -> Any:
         scene_object = self._ids.resolve(object_id)

@@ -343,3 +343,41 @@ def test_scripts_of_a_file_are_left_to_blenders_setting_and_told(bpy: Any, torus
     again = type(torus)(tmp_path / "rig.blend")
     assert not (tmp_path / "ran").exists()
     assert any("rig.py" in note for note in again.space().notes)
+
+
+@pytest.mark.parametrize("way", ["another file", "a new file", "reverted"])
+def test_a_session_ends_with_its_scene(way: str, bpy: Any, torus: Any, tmp_path: Path) -> None:
+    """File > Open under a live session: its next edit is refused, and writes nothing into the other file."""
+    session = open_session(torus)
+    name = paint(session, 1)
+    torus.save(tmp_path / "a.blend")
+    if way == "another file":
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.mesh.primitive_monkey_add()
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "b.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "b.blend"))
+    elif way == "a new file":
+        bpy.ops.wm.read_homefile(use_empty=True)
+    else:
+        bpy.ops.wm.revert_mainfile()
+    for edit in (lambda: session.patches.rotate(name, 0.3), session.undo, session.save):
+        with pytest.raises((CommandRejected, FileRefused), match="ended with its scene"):
+            edit()
+    assert all("contact_core" not in scene for scene in bpy.data.scenes) == (way != "reverted")
+    again = Session(host=type(torus)())
+    assert list(again.document.patches) == ([name] if way == "reverted" else [])
+    again.close()
+
+
+def test_a_host_keeps_to_its_scene(bpy: Any, torus: Any) -> None:
+    """The window may show another scene of the file: contacts go where they are, and not there."""
+    session = open_session(torus)
+    first = bpy.context.scene
+    other = bpy.data.scenes.new("other")
+    bpy.context.window.scene = other
+    name = paint(session, 1)
+    assert "contact_core" in first and "contact_core" not in other
+    bpy.data.scenes.remove(first)
+    with pytest.raises(CommandRejected, match="ended with its scene"):
+        session.patches.rotate(name, 0.1)
+    assert "contact_core" not in other
