@@ -17,6 +17,7 @@ from pathlib import Path
 from contact_core.errors import ContactError
 from contact_core.grasping.suggest import GraspSettings
 from contact_core.grasping.suggest import suggest as suggested
+from contact_core.grasping.verbs import grasp_scene
 from contact_core.job.grasp import HAND, OBJECT, prepare, sheet
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import RENDERERS
@@ -65,7 +66,7 @@ def one(hand: str, thing: str, count: int, plugins: PluginManager, sheets: Path 
     try:
         job = prepare(found(HANDS[hand]), found(name), scale, plugins)
         began, cpu, seen = time.perf_counter(), time.process_time(), 0.0
-        scene = job.session.grasp_scene(HAND, OBJECT, job.words)
+        scene = grasp_scene(job.session, HAND, OBJECT, job.words)
         grasps = []
         for grasp in suggested(scene, GraspSettings(count)):
             seen = seen or time.perf_counter() - began

@@ -42,25 +42,26 @@ class GraspingSession(ProposingSession):
         from contact_core.grasping.suggest import GraspSettings, suggest
 
         chosen = settings or GraspSettings(count, tuple(kinds), at, seed)
-        for found in suggest(self.grasp_scene(hand, thing, words), chosen, progress):
+        for found in suggest(grasp_scene(self, hand, thing, words), chosen, progress):
             self.show_ghost(found.proposal)
             yield found
 
-    def grasp_scene(self, hand: str, thing: str, words: Sequence[HandWords] = ()) -> GraspScene:
-        """What `suggest` works on: the document as the scene has it now, the hand as it describes itself."""
-        from contact_core.grasping.hand import hand_of
-        from contact_core.grasping.suggest import GraspScene
-        from contact_core.hands.describe import describe_hand
 
-        for name in (hand, thing):
-            self.document.surface(name)
-        if hand not in self.rigs:
-            raise InvalidInput(f"{hand!r} has no rig that can be posed, so it is no hand.")
-        if hand == thing or thing in self.rigs:
-            raise InvalidInput(f"{thing!r} bends; grasps are suggested on surfaces that stay as they are.")
-        draft = self._draft()
-        described = hand_of(self.rigs[hand], describe_hand(self.rigs[hand], words))
-        return GraspScene(
-            draft.document, self.derived, self.rigs, described, hand, thing, self.plugins, self.revision,
-            draft.evaluated,
-        )  # fmt: skip
+def grasp_scene(session: ProposingSession, hand: str, thing: str, words: Sequence[HandWords] = ()) -> GraspScene:
+    """What `suggest` works on: the document as the scene has it now, the hand as it describes itsession."""
+    from contact_core.grasping.hand import hand_of
+    from contact_core.grasping.suggest import GraspScene
+    from contact_core.hands.describe import describe_hand
+
+    for name in (hand, thing):
+        session.document.surface(name)
+    if hand not in session.rigs:
+        raise InvalidInput(f"{hand!r} has no rig that can be posed, so it is no hand.")
+    if hand == thing or thing in session.rigs:
+        raise InvalidInput(f"{thing!r} bends; grasps are suggested on surfaces that stay as they are.")
+    draft = session._draft()
+    described = hand_of(session.rigs[hand], describe_hand(session.rigs[hand], words))
+    return GraspScene(
+        draft.document, session.derived, session.rigs, described, hand, thing, session.plugins, session.revision,
+        draft.evaluated,
+    )  # fmt: skip

@@ -22,6 +22,7 @@ from contact_core.edit.command import apply_command
 from contact_core.errors import Cancelled, ContactError, InvalidInput
 from contact_core.geometry.transform import transform_points
 from contact_core.grasping.suggest import GraspScene, GraspSettings, Suggestion, suggest
+from contact_core.grasping.verbs import grasp_scene
 from contact_core.grasping.verdict import DEFINITIONS, spell
 from contact_core.hands.description import HandWords
 from contact_core.job.inputs import object_mesh
@@ -84,7 +85,7 @@ def grasp(
     check_writable(out, names)
     began = time.perf_counter()
     job = prepare(hand, thing, scale, plugins)
-    scene = job.session.grasp_scene(HAND, OBJECT, job.words)
+    scene = grasp_scene(job.session, HAND, OBJECT, job.words)
     try:
         found, first = [], 0.0
         for one in suggest(scene, settings, progress.part(0.05, 0.85)):
