@@ -20,18 +20,19 @@ from contact_core.progress import Progress
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, contact_of, poses_of, problem_of, world_from_surface
 from contact_core.solve.body import PairedPoints
-from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.levenberg_marquardt import FIRST_DAMPING, few_steps
 from contact_core.solve.penetration import RESOLUTION
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.solver import PoseSolver, SolveOptions, SolveStatus
+from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 from contact_core.solve.terms import PoseTerm, paper_terms
 
 if TYPE_CHECKING:
     from contact_core.interaction.desk import Desk
     from contact_core.session import Session
 
-_STEPS_AT_RELEASE = 12
-_WORTH = 1e-3  # of the objective: a step that gains less is not seen, and the pose counts as settled
+_STEPS_AT_RELEASE = 40
+_MOST_IDLE = 5  # steps without any gain, while the damping grows, after which the pose counts as settled
+_WORTH = 1e-4  # of the objective: a step that gains less is not seen, and the pose counts as settled
 
 
 class LiveSolve:
@@ -55,7 +56,8 @@ class LiveSolve:
         self._pinned: tuple[PoseTerm, ...] = ()
         self._warm: tuple[tuple[object, ...], PoseProblem] | None = None
         self._theta: FloatArray | None = None
-        self._settled = True
+        self._settled = self._converged = True
+        self._damping, self._idle, self._to_the_end = FIRST_DAMPING, 0, False
         self.milliseconds, self.solves = 0.0, 0
 
     @property
@@ -70,6 +72,8 @@ class LiveSolve:
 
     def finish(self) -> None:
         """Follow until the pose has settled, or for as many iterations as a solve beside the window may make."""
+        self._to_the_end = True
+        self._settled = self._settled and self._converged
         for _ in range(_STEPS_AT_RELEASE):
             if not self.follow():
                 return
@@ -114,14 +118,26 @@ class LiveSolve:
         """Poses by surface for a document, none where nothing pulls on a rig."""
         problem = self._problem(document)
         if problem is None or not len(problem.start):
-            self._settled = True
+            self._settled = self._converged = True
             return {}
-        options = SolveOptions(max_iterations=self._desk.settings.iterations, candidates=("current",))
-        solution = self._solver().solve(problem, options)
+        solution = self._stepped(problem)
         self._theta = solution.theta
         gained = solution.start_value - solution.value
-        self._settled = solution.status is not SolveStatus.STOPPED or gained <= _WORTH * solution.start_value
+        little = (
+            not self._to_the_end and 0.0 < gained <= _WORTH * solution.start_value
+        )  # no gain at all: the steps were too bold
+        self._idle = 0 if gained > 0.0 else self._idle + 1
+        self._converged = solution.status is not SolveStatus.STOPPED
+        self._settled = self._converged or little or self._idle >= _MOST_IDLE
         return poses_of(solution, self._desk.session.rigs)
+
+    def _stepped(self, problem: PoseProblem) -> PoseSolution:
+        settings = self._desk.settings
+        if settings.solver is None:
+            solution, self._damping = few_steps(problem, settings.iterations, self._damping)
+            return solution
+        solver: PoseSolver = self._desk.made(POSE_SOLVERS, settings.solver)
+        return solver.solve(problem, SolveOptions(max_iterations=settings.iterations, candidates=("current",)))
 
     def _problem(self, document: ContactDocument) -> PoseProblem | None:
         """The problem of a document: that of the last step with what is new, or made anew where it is another."""
@@ -176,13 +192,6 @@ class LiveSolve:
         """The joints that are held, by the bodies that have them."""
         held = (*self._desk.settings.held, *self._desk.held)
         return {body.name: tuple(j for j in held if j in body.rig.joints) for body in problem.bodies}
-
-    def _solver(self) -> PoseSolver:
-        name = self._desk.settings.solver
-        if name is None:
-            return LevenbergMarquardt()
-        found: PoseSolver = self._desk.made(POSE_SOLVERS, name)
-        return found
 
 
 class KeptContacts:

@@ -56,6 +56,22 @@ class LevenbergMarquardt:
             return run.solution(SolveStatus.CANCELLED)
 
 
+def few_steps(problem: PoseProblem, iterations: int, damping: float = FIRST_DAMPING) -> tuple[PoseSolution, float]:
+    """A few iterations from the problem's start, for a solve that goes on frame after frame.
+
+    Also returns the damping to go on with: begun anew, steps that are too bold would be tried again and again.
+    """
+    options = SolveOptions(max_iterations=iterations, candidates=("current",))
+    with one_blas_thread():
+        run = Run(LevenbergMarquardt.name, problem, options)
+        stopped = unsolvable(run)
+        if stopped is not None:
+            return stopped, damping
+        descent = Descent(run, problem.start, options.tolerance, damping)
+        descent.advance(iterations)
+        return run.solution(SolveStatus.CONVERGED if descent.settled else SolveStatus.STOPPED), descent.damping
+
+
 def _race(descents: list[Descent], budget: int) -> SolveStatus:
     """Trial iterations for all, then the best to the end; the status is that of the best."""
     if len(descents) > 1:

@@ -280,8 +280,9 @@ def test_only_the_newest_state_is_solved_for() -> None:
         assert live.solves < 30
     settled = live.solves
     artist.hands.advance()
-    artist.release(start + by(19.0, 0.0))
     assert live.solves == settled  # nothing new, so nothing to do
+    artist.release(start + by(19.0, 0.0))
+    assert "hand" in artist.session.document.poses
 
 
 def test_without_live_the_hand_stays() -> None:
