@@ -154,11 +154,13 @@ class _Motion:
     # --- the problem ----------------------------------------------------------------------------------------
 
     def _problem(self, progress: Progress) -> MotionProblem:
-        problems, drafts = [], []
+        problems, drafts = list[PoseProblem](), list[Draft]()
         for row, frame in enumerate(self.frames):
             progress.tell(row / len(self.frames), f"frame {frame:g}")
             drafts.append(self.draft_at(frame))
-            problems.append(self._problem_at(drafts[-1], frame))
+            problem = self._problem_at(drafts[-1], frame)
+            length = problems[0].length if problems else problem.manipulator_length  # measured once
+            problems.append(replace(problem, length=length))
         self.rigs: dict[str, Rig] = drafts[0].rigs
         bodies, free = problems[0].bodies, problems[0].free_of_body
         self.posed = [b.name for b, dofs in zip(bodies, free, strict=True) if b.name in self.rigs and len(dofs)]
