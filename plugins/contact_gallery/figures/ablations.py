@@ -4,8 +4,8 @@ Above, the paper's own: distances and angles not squared, bounds of 0 to 2 pi, L
 the joints. Below, the form that this package solves by default: squares, the rig's limits, Levenberg-Marquardt.
 Without distance nothing arrives, in either. The paper's form contorts the fingers with and without the prior,
 because rest lies on the lower bound of every joint; with the rig's own limits the prior is hardly missed. Without
-normals the paper's form goes deeper in; ours stays outside, where patches are dense and the hand starts on the
-right side.
+normals both go deeper in, ours by another hundredth of a hand: no catastrophe, where patches are dense and the hand
+starts on the right side.
 """
 
 from typing import Any

@@ -68,4 +68,6 @@ def draw(sheet: Sheet) -> None:
         sheet.measure("points", f"{len(session.geometry.points('finger'))}")
         sheet.measure("paint and measure", f"{seconds['paint']:.0f} ms", "the expensive step, once")
         sheet.measure("slowest edit", f"{edits:.1f} ms", "real time")
-        sheet.measure("folds of the transfer", f"{session.geometry.distortion('finger', on_mug).folds}")
+        sheet.measure(
+            "folds after the bend, in its inner corner", f"{session.geometry.distortion('finger', on_mug).folds}"
+        )
