@@ -17,6 +17,11 @@ from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.interaction.view import world_per_pixel
 from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, POSE_SOLVERS, TOOLS
+from contact_core.scene.problem import Objective, problem_of
+from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
+from contact_core.solve.penetration import PenetrationTerm
+from contact_core.solve.solver import SolveOptions
+from contact_core.solve.terms import paper_terms
 from contact_core.testing.artist import Artist, ball_and_hand, paired
 
 SPOT = np.array([[0.0, 0.0], [6.0, -3.0], [14.0, 8.0]])  # pixels from where a drag begins
@@ -283,6 +288,17 @@ def test_only_the_newest_state_is_solved_for() -> None:
     assert live.solves == settled  # nothing new, so nothing to do
     artist.release(start + by(19.0, 0.0))
     assert "hand" in artist.session.document.poses
+
+
+def test_letting_go_leaves_the_hand_where_a_full_solve_does() -> None:
+    artist = paired()
+    artist.hands.take_up("move")
+    artist.hands.select(surface="ball")
+    artist.drag(*(on_copy(artist) + 4.0 * SPOT))
+    objective = Objective((*paper_terms(), PenetrationTerm()))
+    problem = problem_of(artist.session.geometry, artist.session.rigs, objective)
+    full = LevenbergMarquardt().solve(problem, SolveOptions(max_iterations=500, candidates=("current",)))
+    assert full.start_value <= 1.01 * full.value + 1e-9, (full.start_value, full.value)
 
 
 def test_without_live_the_hand_stays() -> None:
