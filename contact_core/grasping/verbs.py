@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from contact_core.errors import InvalidInput
@@ -48,7 +48,14 @@ class GraspingSession(ProposingSession):
 
 
 def grasp_scene(session: ProposingSession, hand: str, thing: str, words: Sequence[HandWords] = ()) -> GraspScene:
-    """What `suggest` works on: the document as the scene has it now, the hand as it describes itsession."""
+    """What `suggest` works on: the document as the scene has it now, the hand as it describes itself."""
+    return grasp_scene_of(session, hand, thing, words)()
+
+
+def grasp_scene_of(
+    session: ProposingSession, hand: str, thing: str, words: Sequence[HandWords] = ()
+) -> Callable[[], GraspScene]:
+    """`grasp_scene` in two: the scene is read now, the hand looked at in the call, which may be on any thread."""
     from contact_core.grasping.hand import hand_of
     from contact_core.grasping.suggest import GraspScene
     from contact_core.hands.describe import describe_hand
@@ -59,9 +66,11 @@ def grasp_scene(session: ProposingSession, hand: str, thing: str, words: Sequenc
         raise InvalidInput(f"{hand!r} has no rig that can be posed, so it is no hand.")
     if hand == thing or thing in session.rigs:
         raise InvalidInput(f"{thing!r} bends; grasps are suggested on surfaces that stay as they are.")
-    draft = session._draft()
-    described = hand_of(session.rigs[hand], describe_hand(session.rigs[hand], words))
-    return GraspScene(
-        draft.document, session.derived, session.rigs, described, hand, thing, session.plugins, session.revision,
-        draft.evaluated,
-    )  # fmt: skip
+    draft, derived, rigs = session._draft(), session.derived.apart(), dict(session.rigs)
+    plugins, revision = session.plugins, session.revision
+
+    def scene() -> GraspScene:
+        described = hand_of(rigs[hand], describe_hand(rigs[hand], words))
+        return GraspScene(draft.document, derived, rigs, described, hand, thing, plugins, revision, draft.evaluated)
+
+    return scene

@@ -339,7 +339,7 @@ class Interaction:
                 if action == "edit.undo":
                     return  # the gesture was the last thing done
             self._own_actions().get(action, lambda: EDITS[action](self.desk))()
-        self._touch("overlay", "selection", "status", "settings", "visibility")
+        self._touch("overlay", "selection", "status", "settings", "visibility", "work")
 
     def _own_actions(self) -> dict[str, Callable[[], object]]:
         settings = self.settings
@@ -353,6 +353,9 @@ class Interaction:
             "pose.solve": self.proposing.solve,
             "pose.settle": self.proposing.settle,
             "pose.slide": self.proposing.slide,
+            "pose.suggest": self.proposing.suggest,
+            "pose.another": lambda: self.proposing.step(+1),
+            "pose.before": lambda: self.proposing.step(-1),
             "pose.live": lambda: self.set(live=not settings.live),
             "show.xray": lambda: self.set(xray=not settings.xray),
             "show.isolate": lambda: self.set(isolate=not settings.isolate),

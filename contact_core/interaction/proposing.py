@@ -1,4 +1,4 @@
-"""Solve, settle and slide beside the window: begun here, found on a thread, shown as a ghost, then accepted."""
+"""Solve, settle, slide and suggest beside the window: found on a thread, shown as a ghost, then accepted."""
 
 from __future__ import annotations
 
@@ -9,17 +9,19 @@ from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected
 from contact_core.interaction.overlay import Ghost, Overlay
 from contact_core.interaction.work import Worker
-from contact_core.plugins.registry import POSE_TERMS
+from contact_core.plugins.registry import GRASP_SAMPLERS, POSE_TERMS
 from contact_core.progress import Progress
 from contact_core.proposals.draft import Draft
 from contact_core.scene.problem import Objective
 from contact_core.solve.terms import paper_terms
 
 if TYPE_CHECKING:
+    from contact_core.grasping.suggest import Suggestion
     from contact_core.interaction.desk import Desk
     from contact_core.proposals.proposal import Proposal, SolveSettings
 
 _GHOST = (0.55, 0.75, 1.0)
+_SUGGEST = "Suggest"
 Find = Callable[[ContactDocument, Draft, "SolveSettings"], "Proposal"]
 
 
@@ -29,15 +31,30 @@ class Proposing:
     def __init__(self, desk: Desk, worker: Worker) -> None:
         self._desk, self._worker = desk, worker
         self.proposal: Proposal | None = None
+        self.suggestions: tuple[Suggestion, ...] = ()  # found so far, in the order in which they came
 
     @property
     def summary(self) -> str:
         """What is proposed, in a few words; "" for nothing."""
         if self.proposal is None:
             return ""
+        if self.suggestions:
+            return self._suggested
         residuals = self.proposal.after.patches.values()
         worst = max((residual.p95 for residual in residuals), default=0.0)
         return f"proposed: contacts within {worst:.3g}; Enter keeps it, Escape leaves it"
+
+    @property
+    def _suggested(self) -> str:
+        place = self._place
+        one, count = self.suggestions[place], len(self.suggestions)
+        fails = "" if one.is_grasp else f", but {one.verdict.failures[0]}"
+        others = "Down and Up show others, " if count > 1 else ""
+        return f"grasp {place + 1} of {count}: {one.kind}{fails}; {others}Enter keeps it, Escape leaves it"
+
+    @property
+    def _place(self) -> int:
+        return next(n for n, one in enumerate(self.suggestions) if one.proposal is self.proposal)
 
     def solve(self) -> None:
         """Begin to solve the pose."""
@@ -59,6 +76,58 @@ class Proposing:
 
         plugins, revision = self._desk.session.plugins, self._desk.session.revision
         self._begin("Slide", lambda start, draft, settings: slide(start, draft, plugins, revision, settings))
+
+    def suggest(self) -> None:
+        """Begin to look for grasps of the selected object by the selected hand, or of the only ones; the first is
+        shown when it comes. Raises CommandRejected where it is not clear which are meant, InvalidInput."""
+        from contact_core.grasping.suggest import GraspSettings, suggest
+        from contact_core.grasping.verbs import grasp_scene_of
+
+        desk, plugins = self._desk, self._desk.session.plugins
+        scene = grasp_scene_of(desk.session, self._meant(hand=True), self._meant(hand=False))
+        sampler = plugins.name_for(GRASP_SAMPLERS, "grasp")
+        settings = GraspSettings(
+            desk.settings.suggestions, sampler=sampler, sampler_settings=desk.given(GRASP_SAMPLERS, sampler)
+        )
+        self.dismiss()
+        self._worker.begin_some(_SUGGEST, lambda progress: suggest(scene(), settings, progress), self._take)
+
+    def _meant(self, hand: bool) -> str:
+        """The hand, or the object, that is selected: by itself, by the active patch, or as the only one."""
+        session, selection = self._desk.session, self._desk.selection
+        names = [name for name in session.document.surfaces if (name in session.rigs) == hand]
+        patches = (session.document.patch(name).surface for name in reversed(selection.patches))
+        meant = next((name for name in (selection.surface, *patches) if name in names), None)
+        if meant is not None or len(names) == 1:
+            return meant or names[0]
+        what = "hand" if hand else "object"
+        raise CommandRejected(
+            f"there are several: select the {what} that is meant, or a patch on it."
+            if names
+            else f"there is no {what} here: open one first."
+        )
+
+    def _take(self, found: Suggestion) -> None:
+        """One more; the first is shown, and the others wait until they are asked for."""
+        if found.proposal.revision != self._desk.session.revision:
+            self._stop_looking()
+            raise CommandRejected("the document has changed since this was begun: suggest again.")
+        self.suggestions += (found,)
+        if self.proposal is None:
+            self.show(found.proposal)
+
+    def step(self, by: int) -> None:
+        """Show the suggestion that comes `by` places after that which is shown, round and round.
+
+        Raises CommandRejected where there is none.
+        """
+        if not self.suggestions:
+            raise CommandRejected("no grasp has been suggested: Suggest looks for some.")
+        self.show(self.suggestions[(self._place + by) % len(self.suggestions)].proposal)
+
+    def _stop_looking(self) -> None:
+        if self._worker.status is not None and self._worker.status.title == _SUGGEST:
+            self._worker.drop()
 
     def _begin(self, title: str, find: Find) -> None:
         from contact_core.proposals.proposal import SolveSettings
@@ -98,6 +167,7 @@ class Proposing:
         proposal = self.proposal
         if proposal is None:
             raise CommandRejected("nothing is proposed: solve first.")
+        self._stop_looking()
         self.forget()
         self._desk.session.accept(proposal)
 
@@ -110,7 +180,7 @@ class Proposing:
 
     def forget(self) -> None:
         """The document moved on: what was proposed for another is nothing now."""
-        self.proposal, self._desk.ghost = None, None
+        self.proposal, self._desk.ghost, self.suggestions = None, None, ()
 
     def overlay(self) -> Overlay:
         """The hand as it was, behind the one that is proposed."""

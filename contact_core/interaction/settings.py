@@ -24,6 +24,7 @@ class InteractionSettings(HasSettings):
     iterations: int = setting(4, low=1, high=1000, help="steps of the solver while the pointer moves")
     solver: str | None = setting(None, help="the pose solver while dragging; the core's own where none is named")
     held: tuple[str, ...] = setting((), help="joints that stay as they are, such as wrist")
+    suggestions: int = setting(4, low=1, high=64, help="how many grasps Suggest looks for")
     xray: bool = setting(False, help="see through the surface that tools do not work on")
     isolate: bool = setting(False, help="show only the surface that tools work on")
     handle_gap: float = setting(20.0, low=4.0, unit="pixels", help="how far handles on an axis stay apart")

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from queue import SimpleQueue
 from typing import Any
 
 from contact_core.errors import Cancelled, ContactError
@@ -30,8 +31,11 @@ class WorkStatus:
 class _Piece(Progress):
     """One piece of work on its thread; it is its own progress."""
 
-    def __init__(self, title: str, work: Callable[[Progress], Any], done: Callable[[Any], None]) -> None:
-        self.title, self.done = title, done
+    def __init__(
+        self, title: str, work: Callable[[Progress], Any], done: Callable[[Any], None], some: bool
+    ) -> None:
+        self.title, self.done, self.some = title, done, some
+        self.came: SimpleQueue[Any] = SimpleQueue()
         self.status = WorkStatus(title, None, "")
         self.result: Any = None
         self.error: BaseException | None = None
@@ -48,7 +52,11 @@ class _Piece(Progress):
 
     def _run(self) -> None:
         try:
-            self.result = self._work(self)
+            if self.some:
+                for one in self._work(self):
+                    self.came.put(one)
+            else:
+                self.result = self._work(self)
         except BaseException as error:  # told where it can be shown
             self.error = error
         self.over.set()
@@ -68,12 +76,22 @@ class Worker:
     def begin(self, title: str, work: Callable[[Progress], Any], done: Callable[[Any], None]) -> None:
         """Start: `work` on a thread, then `done` with what it returns, in `poll`."""
         self.drop()
-        self._piece = _Piece(title, work, done)
+        self._piece = _Piece(title, work, done, some=False)
+
+    def begin_some(
+        self, title: str, work: Callable[[Progress], Iterable[Any]], each: Callable[[Any], None]
+    ) -> None:
+        """Start work that finds several things: `each` with one after the other, as they come, in `poll`."""
+        self.drop()
+        self._piece = _Piece(title, work, each, some=True)
 
     def cancel(self) -> None:
-        """Ask the work to stop; solvers then return the best they have, which `poll` hands over."""
+        """Ask the work to stop; solvers then return the best they have, which `poll` hands over. Work that finds
+        several things has handed over what it had, and is dropped at once."""
         if self._piece is not None:
             self._piece.stop.set()
+            if self._piece.some:
+                self._piece = None
 
     def drop(self) -> None:
         """Stop the work and forget what it finds."""
@@ -86,12 +104,18 @@ class Worker:
         On the session's thread. Raises what the work raised, a ContactError for people.
         """
         piece = self._piece
-        if piece is None or not piece.over.is_set():
+        if piece is None:
+            return False
+        over = piece.over.is_set()  # asked first: what comes between would be lost
+        while not piece.came.empty() and piece is self._piece:  # whoever gets one may drop the rest
+            piece.done(piece.came.get())
+        if not over or piece is not self._piece:
             return False
         self._piece = None
         piece.thread.join()
         if piece.error is None:
-            piece.done(piece.result)
+            if not piece.some:
+                piece.done(piece.result)
         elif isinstance(piece.error, ContactError):
             raise piece.error
         else:

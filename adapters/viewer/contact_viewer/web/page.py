@@ -126,6 +126,10 @@ def _top(v3: Any, html: Any) -> None:
                 click="trigger('act', ['edit.cancel'])",
             )
         with html.Div(v_if=("proposed",), classes="d-flex align-center mr-2", style="gap: 6px;"):
+            _button(v3, "mdi-chevron-up", "The suggestion before (Up)", v_show=("suggested > 1",),
+                    click="trigger('act', ['pose.before'])")  # fmt: skip
+            _button(v3, "mdi-chevron-down", "The next suggestion (Down)", v_show=("suggested > 1",),
+                    click="trigger('act', ['pose.another'])")  # fmt: skip
             v3.VBtn("Keep", size="small", color="primary", variant="flat", classes="text-none", title="Enter",
                     click="trigger('act', ['edit.accept'])")  # fmt: skip
             v3.VBtn("Leave", size="small", variant="tonal", classes="text-none", title="Esc",
@@ -133,6 +137,9 @@ def _top(v3: Any, html: Any) -> None:
         v3.VBtn("Solve", prepend_icon="mdi-hand-back-right-outline", size="small", color="primary", variant="flat",
                 classes="text-none mr-1", title="Solve (Space)",
                 click="trigger('act', ['pose.solve'])")  # fmt: skip
+        v3.VBtn("Suggest", prepend_icon="mdi-lightbulb-outline", size="small", variant="tonal",
+                classes="text-none mr-1", title="Look for grasps of the object (Shift+G)",
+                click="trigger('act', ['pose.suggest'])")  # fmt: skip
         for name, icon, label, action, tip in (
             (
                 "live",

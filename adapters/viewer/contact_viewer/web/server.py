@@ -247,6 +247,7 @@ class WebApplication:
             "work": None if status.work is None else
             {"title": status.work.title, "text": status.work.text, "fraction": status.work.fraction},
             "proposed": status.proposed,
+            "suggested": len(app.interaction.proposing.suggestions),
             "undo_name": app.undo_name(),
             "redo_name": app.redo_name(),
         }  # fmt: skip
