@@ -192,7 +192,7 @@ def _decoder(annotation: Any) -> Decoder:
 
 def _decode_literal(choices: tuple[Any, ...], data: Any, where: str) -> Any:
     if data not in choices:
-        raise FileRefused(f"{where} is one of {choices}, but {data!r} came.")
+        raise FileRefused(f"{where} is one of {choices}, but got {data!r}.")
     return data
 
 
@@ -217,7 +217,7 @@ def _decode_scalar(annotation: Any, data: Any, where: str) -> Any:
         return _finite(float(data), where)
     if annotation is complex and isinstance(data, list) and len(data) == 2:
         return complex(_finite(float(data[0]), where), _finite(float(data[1]), where))
-    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but {str(data)[:60]!r} came.")
+    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but got {str(data)[:60]!r}.")
 
 
 def _union_decoder(annotation: Any) -> Decoder:
@@ -240,7 +240,7 @@ def _decode_tagged(members: Mapping[Any, Decoder], data: Any, where: str) -> Any
     kind = _object(data, where).get("is")
     if isinstance(kind, str) and kind in members:
         return members[kind](data, where)
-    raise FileRefused(f'{where} needs a key "is" that is one of {", ".join(members)}, but {kind!r} came.')
+    raise FileRefused(f'{where} needs a key "is" that is one of {", ".join(members)}, but got {kind!r}.')
 
 
 def _tuple_decoder(item_types: tuple[Any, ...]) -> Decoder:
@@ -255,13 +255,13 @@ def _decode_items(item: Decoder, data: Any, where: str) -> tuple[Any, ...]:
 
 def _decode_tuple(items: tuple[Decoder, ...], data: Any, where: str) -> tuple[Any, ...]:
     if len(_list(data, where)) != len(items):
-        raise FileRefused(f"{where} wants {len(items)} items, but {len(data)} came.")
+        raise FileRefused(f"{where} wants {len(items)} items, but got {len(data)}.")
     return tuple(item(value, f"{where}[{k}]") for k, (item, value) in enumerate(zip(items, data, strict=True)))
 
 
 def _decode_array(dtype: np.dtype[Any], data: Any, where: str) -> np.ndarray[Any, Any]:
     if not isinstance(data, list) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list of numbers, but {str(data)[:60]!r} came.")
+        raise FileRefused(f"{where} wants a list of numbers, but got {str(data)[:60]!r}.")
     complex_wanted = dtype.kind == "c"
     raw = np.array(data, dtype=np.float64 if complex_wanted else None)
     if raw.dtype.kind not in "biuf" or (raw.dtype.kind == "f" and not np.isfinite(raw).all()):
@@ -315,7 +315,7 @@ def _object(data: Any, where: str) -> Mapping[str, Any]:
 
 def _list(data: Any, where: str) -> Sequence[Any]:
     if not isinstance(data, (list, tuple)) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list, but {str(data)[:60]!r} came.")
+        raise FileRefused(f"{where} wants a list, but got {str(data)[:60]!r}.")
     return data
 
 

@@ -41,7 +41,7 @@ class Proxy:
 
     def __post_init__(self) -> None:
         if self.faces < 1:
-            raise InvalidInput(f"a proxy has faces, but {self.faces} came.")
+            raise InvalidInput(f"a proxy has faces, but got {self.faces}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +233,7 @@ class ContactDocument:
         return tuple(other.name for other in self.patches.values() if other.shape == key and other.name != name)
 
     def children(self, name: str) -> tuple[str, ...]:
-        """The patches that hang on a patch directly."""
+        """The patches that are children of a patch."""
         return tuple(
             other.name
             for other in self.patches.values()

@@ -11,7 +11,7 @@ from contact_core.errors import CommandRejected
 
 
 class OpenMacro:
-    """Commands done so far on a document of its own; `end` answers the one command that they make."""
+    """Commands done so far on a document of its own; `end` returns the one command that they make."""
 
     def __init__(self, title: str, document: ContactDocument) -> None:
         self.title = title

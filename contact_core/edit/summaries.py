@@ -124,11 +124,11 @@ def _patch_changes(before: ContactDocument, after: ContactDocument, old: Patch, 
 def _placement_changes(old: Placement, new: Placement) -> Iterator[str]:
     if isinstance(old, Link) and isinstance(new, Link):
         if old.parent != new.parent:
-            yield f"hangs on {new.parent}, was on {old.parent}"
+            yield f"is a child of {new.parent} now, was of {old.parent}"
         elif old != new:
             yield f"moved relative to {new.parent}"
     elif isinstance(new, Link):
-        yield f"now hangs on {new.parent}"
+        yield f"is a child of {new.parent} now"
     elif isinstance(old, Link):
         yield f"unlinked from {old.parent}"
     elif isinstance(old, Walk) or isinstance(new, Walk):

@@ -115,7 +115,7 @@ class GraspSettings:
         if wrong:
             raise InvalidInput(f"a grasp is one of {', '.join(KINDS)}, but {wrong[0]!r} was asked for.")
         if not 0 <= self.seed < 2**32:
-            raise InvalidInput(f"the seed is a whole number from 0 to 2^32 - 1, but {self.seed} came.")
+            raise InvalidInput(f"the seed is a whole number from 0 to 2^32 - 1, but got {self.seed}.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ def _chosen(desk: Desk) -> tuple[str, ...]:
 
 
 def remove(desk: Desk) -> None:
-    """Remove the selected patches; what hangs on them stays."""
+    """Remove the selected patches; their children stay."""
     desk.session.patches.remove(*_chosen(desk))
 
 
@@ -52,7 +52,7 @@ def unlink(desk: Desk) -> None:
     document = desk.session.document
     linked = [name for name in _chosen(desk) if isinstance(document.patch(name).placement, Link)]
     if not linked:
-        raise CommandRejected("none of the selected patches hangs on another.")
+        raise CommandRejected("none of the selected patches is the child of another.")
     with desk.session.macro("Unlink " + ", ".join(linked)):
         for patch in linked:
             desk.session.patches.unlink(patch)

@@ -96,7 +96,7 @@ def write_movie(
     except ImportError:
         raise InvalidInput("a movie needs Pillow: pip install 'contact-core[app]'.") from None
     if not 0 < len(frames) <= MOST_PICTURES:
-        raise InvalidInput(f"a movie has 1 to {MOST_PICTURES} pictures, but {len(frames)} frames came.")
+        raise InvalidInput(f"a movie has 1 to {MOST_PICTURES} pictures, but got {len(frames)} frames.")
     rate, renderer = session.timeline.settings.frames_per_second, _renderer(session)
     pictures = pictures_of(session, frames, progress.part(0.0, 0.3))
     images = []

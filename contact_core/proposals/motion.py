@@ -61,7 +61,7 @@ class MotionSettings:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < np.inf:
-            raise InvalidInput(f"the tolerance of keys is a positive number of metres, but {self.tolerance} came.")
+            raise InvalidInput(f"the tolerance of keys is a positive number of metres, but got {self.tolerance}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +117,7 @@ class _Motion:
         self.rate = timed.timeline.frames_per_second
         asked = sorted({float(frame) for frame in frames})
         if not asked or not np.isfinite(asked).all() or len(asked) != len(list(frames)):
-            raise InvalidInput(
-                f"frames to solve are numbers, each once, at least one, but {list(frames)[:6]} came."
-            )
+            raise InvalidInput(f"frames to solve are numbers, each once, at least one, but got {list(frames)[:6]}.")
         self.before, self.after = self._pinned_beside(asked)
         authored = {f for track in self._tracks().values() for f in _authored(track) if asked[0] < f < asked[-1]}
         self.frames = tuple(sorted({*asked, *self.before, *self.after, *authored}))

@@ -47,7 +47,7 @@ def open_files(sources: Sequence[str], plugins: PluginManager, recovered: Contac
     documents = [source for source in sources if source.lower().endswith(DOCUMENT_SUFFIX)]
     rest = [source for source in sources if source not in documents]
     if len(documents) > 1:
-        raise FileRefused(f"one document at a time is edited, but {len(documents)} came: {', '.join(documents)}.")
+        raise FileRefused(f"one document at a time is edited, but got {len(documents)}: {', '.join(documents)}.")
     scenes = [source for source in rest if _is_scene(source, plugins)]
     if scenes and len(sources) > 1:
         raise FileRefused(f"{scenes[0]} is a scene of its own: open it alone, without other files.")

@@ -62,7 +62,7 @@ def from_hex(text: str) -> Color:
     """The colour of "#rrggbb". Raises ValueError for anything else."""
     digits = text.removeprefix("#")
     if len(digits) != 6:
-        raise ValueError(f"a colour is spelt #rrggbb, but {text!r} came.")
+        raise ValueError(f"a colour is spelt #rrggbb, but got {text!r}.")
     red, green, blue = (int(digits[k : k + 2], 16) / 255 for k in (0, 2, 4))
     return red, green, blue
 

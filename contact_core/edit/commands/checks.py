@@ -1,4 +1,4 @@
-"""Checks that several commands share. Each answers what it checked or raises CommandRejected in a sentence."""
+"""Checks that several commands share. Each returns what it checked or raises CommandRejected in a sentence."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def check_placement(document: ContactDocument, patch: Patch, placement: Placemen
     parent = document.patch(placement.parent)
     if placement.parent == patch.name or patch.name in document.ancestors(placement.parent):
         raise CommandRejected(
-            f"{patch.name!r} cannot hang on {placement.parent!r}: that one hangs on it already, and a tree has no"
+            f"{patch.name!r} cannot be a child of {placement.parent!r}, which descends from it, and a tree has no"
             " cycles. Unlink one of them first."
         )
     if parent.surface != patch.surface:
         raise CommandRejected(
-            f"{patch.name!r} on {patch.surface!r} cannot hang on {parent.name!r} on {parent.surface!r}:"
+            f"{patch.name!r} on {patch.surface!r} cannot be a child of {parent.name!r} on {parent.surface!r}:"
             " a link is a path on one surface."
         )
     for name, point in ((parent.name, placement.parent_point), (patch.name, placement.own_point)):

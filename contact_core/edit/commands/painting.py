@@ -174,7 +174,9 @@ class Remove(BaseCommand):
         for patch in document.patches.values():
             hangs_on = patch.placement.parent if isinstance(patch.placement, Link) else None
             if hangs_on in gone and patch.name not in gone:
-                raise CommandRejected(f"{patch.name!r} hangs on {hangs_on!r}: unlink it first, or remove both.")
+                raise CommandRejected(
+                    f"{patch.name!r} is a child of {hangs_on!r}: unlink it first, or remove both."
+                )
         pairs = [pair.name for pair in document.pairs.values() if {pair.manipulator, pair.object} & gone]
         groups = {
             name: left

@@ -179,7 +179,7 @@ class Settle(BaseCommand):
 
 @dataclass(frozen=True, eq=False)
 class LinkPatch(BaseCommand):
-    """A patch hung on a parent."""
+    """A patch made the child of another."""
 
     json_id: ClassVar[str] = "contact.link"
     patch: str
@@ -210,6 +210,6 @@ class Unlink(BaseCommand):
     def apply(self, document: ContactDocument) -> ContactDocument:
         patch = document.patch(self.patch)
         if not isinstance(patch.placement, Link):
-            raise CommandRejected(f"{self.patch!r} hangs on no other patch.")
+            raise CommandRejected(f"{self.patch!r} is the child of no patch.")
         check_placement(document, patch, self.root)
         return document.with_patches(replace(patch, placement=self.root))

@@ -69,7 +69,7 @@ def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
     for text in arguments.set:
         key, equals, value = text.partition("=")
         if not equals:
-            raise InvalidInput(f"a setting is spelt NAME=VALUE, but {text!r} came.")
+            raise InvalidInput(f"a setting is spelt NAME=VALUE, but got {text!r}.")
         found[key] = _value(value, kinds.get(key, "text"))
     return found
 

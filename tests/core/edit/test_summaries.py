@@ -38,7 +38,7 @@ def test_edits_are_told_in_words(session: Session) -> None:
         "patch palm: rotated by +28.6 degrees",
         "patch palm: bent by +11.5 degrees at axis point 1",
         "patch thumb: scaled to 0.8 along and 1 across its axis",
-        "patch tip: now hangs on thumb",
+        "patch tip: is a child of thumb now",
         "patch tip: recoloured",
     ]
 
