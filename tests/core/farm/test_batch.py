@@ -224,7 +224,9 @@ def test_ctrl_c_leaves_a_report_and_the_code_of_an_interrupt(jobs: Path) -> None
         "--workers",
         "1",
     ]
-    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    # Shells have what they run in the background ignore SIGINT, and children inherit that.
+    heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heed)
     deadline = time.monotonic() + 60
     while not list(jobs.glob(f"out/*/{RECEIPT}")) and time.monotonic() < deadline:
         time.sleep(0.02)
