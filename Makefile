@@ -13,7 +13,7 @@ READY := $(VENV)/.ready
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo gallery test explore test-blender-all lint typecheck pytest wheel matrix bench docs contract-report clean
+.PHONY: help demo gallery test explore test-blender-all blender-extension lint typecheck pytest wheel matrix bench docs contract-report clean
 
 help:
 	@echo "make demo | test | lint | bench | docs | clean"
@@ -55,6 +55,11 @@ explore: $(READY)
 # Blender 4.5 LTS, 5.0 and 5.2, each in an environment of its own (make test has 5.0 already).
 test-blender-all: $(READY)
 	$(BIN)/python adapters/blender/run_tests.py --all
+
+# The zip that an artist installs, for this platform; BLENDER_PYTHON=3.13 for Blender 5.1 and later.
+BLENDER_PYTHON ?= 3.11
+blender-extension: $(READY)
+	$(BIN)/python adapters/blender/build_extension.py --python $(BLENDER_PYTHON)
 
 wheel: $(READY)
 	$(BIN)/python .ci/wheel.py

@@ -256,6 +256,24 @@ class BlenderHost(
         reached = np.unique(asset.source_vertices[chosen])
         return SurfacePoints.at_vertices(asset.mesh, reached[reached >= 0])
 
+    def select_points(self, object_id: str, points: SurfacePoints, selection_name: str) -> int:
+        """Let the selection, or a vertex group, be the vertices next to surface points; one step of undo.
+
+        Each point is stood for by the nearest corner of its face. A vertex group that a bone or a modifier reads is
+        not overwritten. Returns how many vertices. Raises InvalidInput.
+        """
+        scene_object = self._mesh_object(object_id)
+        asset = self.read_surface(object_id)
+        if asset.source_vertices is None:
+            raise InvalidInput(f"the modifiers of {object_id} make vertices that stand for none of its own.")
+        selection.check_writable(scene_object, selection_name)
+        corners = asset.mesh.faces[points.faces, points.barycentric.argmax(axis=1)]
+        wanted = np.flatnonzero(np.isin(asset.source_vertices, corners))
+        with self.step("Select patch"):
+            put_back = selection.choose(scene_object, wanted, selection_name)
+            self._undo.wrote(lambda: put_back(self._ids.resolve(object_id)))
+        return len(wanted)
+
     def show(self, picture: Picture | None) -> None:
         """Over every 3D view; without a window it waits for one."""
         if self._overlay is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bmesh
@@ -35,6 +36,57 @@ def vertices(scene_object: Any, selection: str) -> IntArray:
         return _flagged(scene_object, selection)
     there = ", ".join(map(repr, names(scene_object))) or "nothing"
     raise InvalidInput(f"{scene_object.name} has no selection {selection!r}; there is {there}.")
+
+
+def check_writable(scene_object: Any, selection: str) -> None:
+    """Raises InvalidInput for a vertex group that deforms the mesh: a bone's, or one that a modifier reads."""
+    armatures = [each.object for each in scene_object.modifiers if each.type == "ARMATURE" and each.object]
+    bones = {bone.name for armature in armatures for bone in armature.data.bones}
+    read = {getattr(each, "vertex_group", "") for each in scene_object.modifiers}
+    if selection in bones | read - {""}:
+        raise InvalidInput(
+            f"the vertex group {selection!r} of {scene_object.name} deforms the mesh; give another name."
+        )
+
+
+def choose(scene_object: Any, wanted: IntArray, selection: str) -> Callable[[Any], None]:
+    """Let the selection, or the vertex group of this name, be these vertices of the cage; outside of Edit Mode.
+
+    Returns what puts back how it was, given the object anew.
+    """
+    before = vertices(scene_object, selection) if selection in names(scene_object) else None
+    if selection == LIVE:
+        _select(scene_object, wanted)
+        return lambda again: _select(again, np.zeros(0, np.int64) if before is None else before)
+    _write_group(scene_object, selection, wanted)
+    return lambda again: _write_group(again, selection, before)
+
+
+def _select(scene_object: Any, wanted: IntArray) -> None:
+    """Vertices, with the edges and faces that lie between them: Edit Mode reads all three."""
+    mesh = scene_object.data
+    chosen = np.zeros(len(mesh.vertices), np.bool_)
+    chosen[wanted] = True
+    edges = np.empty(2 * len(mesh.edges), np.int32)
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.edges.foreach_get("vertices", edges)
+    mesh.loops.foreach_get("vertex_index", corners)
+    mesh.vertices.foreach_set("select", chosen)
+    mesh.edges.foreach_set("select", chosen[edges].reshape(-1, 2).all(axis=1))
+    starts = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    if len(starts):
+        mesh.polygons.foreach_set("select", np.logical_and.reduceat(chosen[corners], starts))
+    mesh.update()
+
+
+def _write_group(scene_object: Any, name: str, wanted: IntArray | None) -> None:
+    """A vertex group of these vertices with weight 1; None: no such group."""
+    group = scene_object.vertex_groups.get(name)
+    if group is not None:
+        scene_object.vertex_groups.remove(group)
+    if wanted is not None:
+        scene_object.vertex_groups.new(name=name).add(wanted.tolist(), 1.0, "REPLACE")
 
 
 def _live(scene_object: Any) -> IntArray:

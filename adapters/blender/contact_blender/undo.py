@@ -15,7 +15,7 @@ import bpy
 
 from contact_core.errors import InvalidInput
 
-_WHOLE_SCENE = frozenset(("OBJECT", "POSE", "SCULPT", "PAINT_WEIGHT", "PAINT_VERTEX"))  # what a step holds there
+WHOLE_SCENE = frozenset(("OBJECT", "POSE", "SCULPT", "PAINT_WEIGHT", "PAINT_VERTEX"))  # what a step holds there
 
 
 class UndoBridge:
@@ -113,7 +113,7 @@ def _handlers() -> tuple[Any, Any]:
 
 def _refuse_partial_modes(label: str) -> None:
     mode = str(bpy.context.mode)
-    if mode in _WHOLE_SCENE:
+    if mode in WHOLE_SCENE:
         return
     name = "Edit Mode" if mode.startswith("EDIT") else mode.replace("_", " ").title()
     raise InvalidInput(

@@ -1,0 +1,138 @@
+"""One session for each open scene, shared by panel, operators and scripts.
+
+Blender imports a module once, so what is kept here is what every part of the add-on sees. Scenes are known by their
+session uid; no Blender object is kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import bpy
+
+if TYPE_CHECKING:
+    from contact_core.proposals.proposal import Proposal
+    from contact_core.session import Session
+
+KEY = "contact_core"  # as storage.KEY: that module loads more than a panel may wait for
+OLDEST_NUMPY = (1, 26)  # as in pyproject.toml
+LIBRARIES = ("numpy", "scipy", "numba", "pluggy", "threadpoolctl", "rich")
+
+
+@dataclass
+class Held:
+    """What is kept of a scene. residuals: 95 % of a pair's points are nearer than this (scene units), by pair, as
+    the solve of `solved` (a revision) left them."""
+
+    session: Session
+    residuals: dict[str, float] = field(default_factory=dict)
+    solved: int = -1
+
+
+_held: dict[int, Held] = {}
+
+
+def missing() -> str:
+    """A sentence about libraries that are not there or too old, "" where all is well. Looked up once."""
+    return _missing(LIBRARIES, OLDEST_NUMPY)
+
+
+@cache
+def _missing(libraries: tuple[str, ...], oldest_numpy: tuple[int, int]) -> str:
+    gone = [name for name in libraries if find_spec(name) is None]
+    if not gone:
+        return _old_numpy(oldest_numpy)
+    return (
+        f"Contact cannot work: this Blender's Python has no {', '.join(gone)}. Install the extension's zip that was"
+        " built for this Blender and this platform."
+    )
+
+
+def _old_numpy(oldest: tuple[int, int]) -> str:
+    import numpy  # Blender's own
+
+    here = tuple(int(part) for part in numpy.__version__.split(".")[:2])
+    if here >= oldest:
+        return ""
+    wanted = ".".join(map(str, oldest))
+    return f"Contact cannot work: numpy {wanted} is needed, and this Blender has {numpy.__version__}."
+
+
+def held() -> Held | None:
+    """What is kept of the scene that is open, None before the first use and after its end. Begins nothing."""
+    found = _held.get(int(bpy.context.scene.session_uid))
+    return None if found is None or found.session.host is None else found
+
+
+def is_stored() -> bool:
+    """Whether the open scene holds contacts."""
+    return KEY in bpy.context.scene
+
+
+def session() -> Session:
+    """The session of the scene that is open, begun at the first use; the scene's end ends it.
+
+    Raises InvalidInput where a library is missing, and FileRefused for contacts that cannot be read.
+    """
+    found = held()
+    if found is not None:
+        return found.session
+    _forget_ended()
+    gone = missing()
+    if gone:
+        from contact_core.errors import InvalidInput
+
+        raise InvalidInput(gone)
+    from contact_blender.host import BlenderHost
+    from contact_core.session import Session
+
+    begun = Session(host=BlenderHost())
+    _held[int(bpy.context.scene.session_uid)] = Held(begun)
+    begun.listen(lambda change: list_patches() if change.kind != "preview" else None)
+    list_patches()
+    return begun
+
+
+def list_patches() -> None:
+    """Bring the rows of the panel in line with the document: after every edit, undo and redo."""
+    found, manager = held(), bpy.context.window_manager
+    if found is None or not hasattr(manager, "contact"):  # a script may use the session without the panel
+        return
+    document, settings = found.session.document, manager.contact
+    if settings.patch not in document.patches:
+        settings.patch = next(iter(reversed(list(document.patches))), "")
+    rows = settings.rows
+    pair_of = {end: name for name, pair in document.pairs.items() for end in (pair.manipulator, pair.object)}
+    rows.clear()
+    for patch in document.patches.values():
+        row = rows.add()
+        row.name, row.color, row.pair = patch.name, patch.color, pair_of.get(patch.name, "")
+
+
+def keep_residuals(proposal: Proposal) -> None:
+    """Keep how well the pairs are met, for the panel. The proposal has just been accepted."""
+    found = held()
+    if found is not None:
+        found.residuals = {name: each.p95 for name, each in proposal.after.patches.items()}
+        found.solved = found.session.revision
+
+
+def close_all() -> None:
+    """Close every session; contacts stay in their scenes."""
+    for found in _held.values():
+        if found.session.host is not None:
+            found.session.close()
+    _held.clear()
+
+
+def _forget_ended() -> None:
+    """Let go of sessions that have ended, and of those whose scene was removed."""
+    there: set[Any] = {scene.session_uid for scene in bpy.data.scenes}
+    for uid, found in tuple(_held.items()):
+        if uid not in there and found.session.host is not None:
+            found.session.close()
+        if uid not in there or found.session.host is None:
+            del _held[uid]

@@ -1,0 +1,419 @@
+"""The add-on: what registers, what each operator does and takes back, what it refuses in words."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def shared(bpy: Any, empty: Any) -> Iterator[Any]:
+    """The module that holds sessions, with the add-on registered, two grids and a cube in the scene."""
+    from contact_blender import extension
+
+    for name, x in (("left", 0.0), ("right", 5.0)):
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=12, y_subdivisions=12, size=2.0, location=(x, 0.0, 0.0))
+        bpy.context.object.name = name
+    extension.register()
+    yield extension.shared
+    extension.unregister()
+
+
+def choose(bpy: Any, name: str, low: float = -0.45, high: float = 0.45) -> Any:
+    """Make an object active, with the vertices of a square selected."""
+    for each in bpy.context.view_layer.objects:
+        each.select_set(each.name == name)
+    thing = bpy.context.view_layer.objects.active = bpy.data.objects[name]
+    for part in (thing.data.vertices, thing.data.edges, thing.data.polygons):
+        part.foreach_set("select", np.zeros(len(part), bool))
+    places = np.array([vertex.co for vertex in thing.data.vertices])
+    thing.data.vertices.foreach_set("select", (np.abs(places[:, :2] - (low + high) / 2) < (high - low) / 2).all(1))
+    return thing
+
+
+def painted(bpy: Any, shared: Any, patch: str = "grip", surface: str = "left") -> Any:
+    choose(bpy, surface)
+    assert bpy.ops.contact.paint(patch=patch) == {"FINISHED"}
+    return shared.session()
+
+
+def two(bpy: Any, shared: Any) -> Any:
+    painted(bpy, shared, "small")
+    choose(bpy, "left", 0.5, 0.95)
+    bpy.ops.contact.paint(patch="child")
+    return shared.session()
+
+
+def one_step(bpy: Any, session: Any, run: Callable[[], set[str]]) -> tuple[Any, Any]:
+    """Documents before and after an operator, of which one Ctrl+Z goes back, and a redo forth again."""
+    before, revision = session.document, session.revision
+    assert run() == {"FINISHED"}
+    after, reached = session.document, session.revision
+    assert reached > revision and after is not before
+    bpy.ops.ed.undo()
+    assert session.revision == revision and session.document is before
+    bpy.ops.ed.redo()
+    assert session.revision == reached and session.document is after
+    return before, after
+
+
+def test_registering_loads_nothing_heavy() -> None:
+    heavy = ("numba", "scipy", "contact_core.session", "contact_core.edit", "contact_core.geometry")
+    script = (
+        "import os, sys, bpy\nfrom contact_blender import extension\nextension.register()\n"
+        f"loaded = [name for name in {heavy!r} if name in sys.modules]\n"
+        "print('loaded', loaded, flush=True)\nos._exit(0)"
+    )
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    assert "loaded []" in said.stdout, said.stdout + said.stderr
+
+
+def test_cycles_leave_handlers_and_classes_as_they_were(bpy: Any, shared: Any) -> None:
+    from contact_blender import extension
+
+    def state() -> Any:
+        handlers = {n: len(h) for n in dir(bpy.app.handlers) if isinstance(h := getattr(bpy.app.handlers, n), list)}
+        kinds = sorted(n for n in dir(bpy.types) if "contact" in n.lower())
+        return handlers, kinds, hasattr(bpy.types.WindowManager, "contact"), sorted(dir(bpy.ops.contact))
+
+    extension.unregister()
+    before = state()
+    for _ in range(100):
+        extension.register()
+        extension.register()
+        shared.session()
+        assert bpy.ops.contact.begin.poll()
+        extension.unregister()
+    assert state() == before
+    assert not before[1] and not before[2] and not before[3]
+
+
+def test_panel_and_scripts_share_a_session(bpy: Any, shared: Any) -> None:
+    session = painted(bpy, shared)
+    session.patches.rename("grip", "palm")
+    assert [row.name for row in bpy.context.window_manager.contact.rows] == ["palm"]
+    bpy.ops.ed.undo()
+    assert [row.name for row in bpy.context.window_manager.contact.rows] == ["grip"]
+    bpy.ops.contact.rotate(patch="grip", angle=0.1)
+    assert shared.session() is session
+
+
+def test_a_session_ends_with_its_scene(bpy: Any, shared: Any, tmp_path: Any) -> None:
+    session = painted(bpy, shared)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "grip.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert shared.held() is None and session.host is None
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "grip.blend"))
+    assert shared.is_stored() and bpy.ops.contact.rotate.poll()
+    assert bpy.ops.contact.begin() == {"FINISHED"}
+    again = shared.session()
+    assert again is not session and list(again.document.patches) == ["grip"]
+    assert again.binding.surfaces["left"].object_id == "left"  # two objects have its triangles: it is remembered
+
+
+def test_painting_from_selection_and_group_and_adding(bpy: Any, shared: Any) -> None:
+    thing = choose(bpy, "left")
+    chosen = [vertex.index for vertex in thing.data.vertices if vertex.select]
+    bpy.ops.contact.begin()
+    session = shared.session()
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.paint(patch="grip", color=(0.1, 0.2, 0.3)))
+    assert after.patch("grip").color == pytest.approx((0.1, 0.2, 0.3))
+    assert len(session.geometry.points("grip")) == len(chosen) > 8
+    bpy.data.objects["left"].vertex_groups.new(name="edge").add([0, 1, 2, 13, 14, 15], 1.0, "REPLACE")
+    one_step(bpy, session, lambda: bpy.ops.contact.paint(patch="grip", group="edge"))
+    assert len(session.geometry.points("grip")) == len(chosen) + 6
+    one_step(bpy, session, lambda: bpy.ops.contact.paint(group="edge"))
+    assert list(session.document.patches) == ["grip", "edge"]
+
+
+def test_erasing(bpy: Any, shared: Any) -> None:
+    session = painted(bpy, shared)
+    whole = len(session.geometry.points("grip"))
+    choose(bpy, "left", 0.0, 0.45)
+    one_step(bpy, session, lambda: bpy.ops.contact.erase(patch="grip"))
+    assert 0 < len(session.geometry.points("grip")) < whole
+
+
+def test_adding_surfaces(bpy: Any, shared: Any) -> None:
+    for name in ("left", "right"):
+        bpy.data.objects[name].select_set(True)
+    session = shared.session()
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.add_surfaces())
+    assert set(after.surfaces) == {"left", "right"}
+
+
+@pytest.mark.parametrize("at", ["CURSOR", "SELECTION"])
+def test_transferring_pairs_the_copy(bpy: Any, shared: Any, at: str) -> None:
+    session = painted(bpy, shared)
+    choose(bpy, "right", 0.1, 0.55)
+    bpy.context.scene.cursor.location = (5.3, 0.2, 0.7)
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.transfer(patch="grip", at=at, name="copy"))
+    assert after.patch("copy").surface == "right" and after.patch("copy").mirrored
+    assert [(pair.manipulator, pair.object) for pair in after.pairs.values()] == [("grip", "copy")]
+    root = session.geometry.root("copy").point().positions(session.geometry.mesh("right"))[0]
+    if at == "CURSOR":
+        assert root == pytest.approx((0.3, 0.2, 0.0), abs=1e-6)
+    else:
+        assert np.abs(root[:2] - 0.325).max() < 0.2
+
+
+def test_pairing_and_unpairing(bpy: Any, shared: Any) -> None:
+    session = painted(bpy, shared)
+    choose(bpy, "right")
+    bpy.ops.contact.transfer(patch="grip", name="copy", pair=False)
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.pair(patch="grip", other="copy", weight=0.5))
+    assert [pair.weight for pair in after.pairs.values()] == [0.5]
+    assert {row.pair for row in bpy.context.window_manager.contact.rows} == set(after.pairs)
+    bpy.context.window_manager.contact.patch = "copy"
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.unpair())
+    assert not after.pairs and len(after.patches) == 2
+
+
+def test_moving_turning_bending_scaling(bpy: Any, shared: Any) -> None:
+    session = painted(bpy, shared)
+    before = session.geometry.points("grip").positions(session.geometry.mesh("left"))
+
+    def moved() -> Any:
+        now = session.geometry.points("grip").positions(session.geometry.mesh("left"))
+        return float(np.abs(now - before).max())
+
+    one_step(bpy, session, lambda: bpy.ops.contact.rotate(patch="grip", angle=0.3))
+    assert moved() > 0.05
+    bpy.ops.ed.undo()
+    assert moved() < 1e-9
+    bpy.context.scene.cursor.location = (0.2, 0.1, 3.0)
+    one_step(bpy, session, lambda: bpy.ops.contact.translate(patch="grip"))
+    root = session.geometry.root("grip").point().positions(session.geometry.mesh("left"))[0]
+    assert root == pytest.approx((0.2, 0.1, 0.0), abs=1e-6)
+
+    def size() -> float:
+        now = session.geometry.points("grip").positions(session.geometry.mesh("left"))
+        return float(np.sqrt(np.linalg.det(np.cov(now[:, :2].T))))
+
+    whole = size()
+    one_step(bpy, session, lambda: bpy.ops.contact.scale(patch="grip", along=0.8, spread=0.7))
+    assert size() == pytest.approx(0.8 * 0.7 * whole, rel=1e-6)
+    one_step(bpy, session, lambda: bpy.ops.contact.bend(patch="grip", point=1, angle=0.2))
+
+
+def test_linking_and_unlinking(bpy: Any, shared: Any) -> None:
+    from contact_core.contact.placement import Link
+
+    session = two(bpy, shared)
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.link(patch="child", parent="small"))
+    assert isinstance(after.patch("child").placement, Link) and after.patch("child").placement.parent == "small"
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.unlink(patch="child"))
+    assert not isinstance(after.patch("child").placement, Link)
+
+
+def test_renaming_and_removing(bpy: Any, shared: Any) -> None:
+    session = painted(bpy, shared)
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.rename(patch="grip", name="palm"))
+    assert list(after.patches) == ["palm"] and bpy.context.window_manager.contact.patch == "palm"
+    _, after = one_step(bpy, session, lambda: bpy.ops.contact.remove(patch="palm"))
+    assert not after.patches and bpy.context.window_manager.contact.patch == ""
+    bpy.ops.ed.undo()
+    assert bpy.context.window_manager.contact.patch == "palm"
+
+
+def test_selecting_the_vertices_of_a_patch(bpy: Any, shared: Any) -> None:
+    painted(bpy, shared)
+    thing = bpy.data.objects["left"]
+    wanted = [vertex.index for vertex in thing.data.vertices if vertex.select]
+    choose(bpy, "left", 0.8, 0.81)
+    assert bpy.ops.contact.select(patch="grip") == {"FINISHED"}
+    assert [vertex.index for vertex in bpy.data.objects["left"].data.vertices if vertex.select] == wanted
+    assert sum(face.select for face in bpy.data.objects["left"].data.polygons) > 0
+    bpy.ops.contact.select(patch="grip", group="kept")
+    group = bpy.data.objects["left"].vertex_groups["kept"].index
+    held = [v.index for v in bpy.data.objects["left"].data.vertices if any(g.group == group for g in v.groups)]
+    assert held == wanted
+    bpy.ops.ed.undo()
+    assert "kept" not in bpy.data.objects["left"].vertex_groups
+    assert list(shared.session().document.patches) == ["grip"]
+
+
+class Layout:
+    """What a panel draws into, for Blender has none without a window: texts are kept, and operators and properties
+    have to be registered ones."""
+
+    def __init__(self, bpy: Any, texts: list[str]) -> None:
+        self.bpy, self.texts, self.enabled = bpy, texts, True
+
+    def row(self, align: bool = False) -> Layout:
+        return Layout(self.bpy, self.texts)
+
+    box = column = row
+
+    def label(self, text: str, icon: str = "NONE") -> None:
+        assert icon in self.bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
+        self.texts.append(text)
+
+    def prop(self, data: Any, name: str, text: str | None = None) -> None:
+        assert name in data.bl_rna.properties
+
+    def prop_search(self, data: Any, name: str, searched: Any, rows: str) -> None:
+        assert name in data.bl_rna.properties and rows in searched.bl_rna.properties
+
+    def operator(self, name: str, text: str = "") -> Any:
+        known = getattr(self.bpy.ops.contact, name.removeprefix("contact.")).get_rna_type().properties
+
+        class Given:
+            def __setattr__(self, key: str, value: Any) -> None:
+                assert key in known
+
+        return Given()
+
+
+def drawn(bpy: Any) -> list[str]:
+    """The texts of the panel as it is now."""
+    from types import SimpleNamespace
+
+    from contact_blender.extension import panel
+
+    texts: list[str] = []
+    panel.CONTACT_PT_contacts.draw(SimpleNamespace(layout=Layout(bpy, texts)), bpy.context)
+    return texts
+
+
+def test_the_panel_shows_what_there_is(bpy: Any, hand: Any) -> None:
+    from contact_blender.extension import shared
+
+    names = list(hand.document.pairs)
+    assert drawn(bpy).count("not solved") == len(names) == 2
+    bpy.ops.contact.solve()
+    kept = shared.held()
+    assert kept is not None
+    assert {f"within {kept.residuals[name]:.3g}" for name in names} < set(drawn(bpy))
+    assert set(hand.document.patches) | {"Pairs"} < set(drawn(bpy))
+    bpy.ops.contact.rotate(patch=next(iter(hand.document.patches)), angle=0.1)
+    assert "Pairs (edited since the last solve)" in drawn(bpy)
+    shared.close_all()
+    assert drawn(bpy) == []  # nothing was begun: a button that shows what the scene holds
+
+
+@pytest.fixture
+def hand(bpy: Any, empty: Any) -> Iterator[Any]:
+    """A hand and a ball with two pairs, in a session of the add-on."""
+    import contact_core as contact
+    from contact_blender import extension
+
+    extension.register()
+    session = extension.shared.session()
+    for name in ("human_hand", "baseball"):
+        session.host.add(contact.read_asset(f"sample:{name}"))
+    for each in bpy.context.scene.objects:
+        each.select_set(each.type == "MESH")
+        if each.type == "MESH":
+            bpy.context.view_layer.objects.active = each
+    assert bpy.ops.contact.add_surfaces() == {"FINISHED"}
+    rigged, thing = sorted(session.document.surfaces, key=lambda name: name not in session.rigs)
+    rig, ball = session.rigs[rigged], session.geometry.mesh(thing)
+    size = np.ptp(ball.points, axis=0).max()
+    for side, name in ((-1.0, "thumb_distal"), (1.0, "index_distal")):
+        tip = rig.rest_world[rig.joint_index(name), :3, 3]
+        session.patches.brush("disk", name, surface=rigged, at=tip, radius=0.05 * size)
+        root = contact.SurfacePoints.at_vertices(ball, [int(np.argmax(side * ball.points[:, 0]))])
+        session.pairs.add(name, session.patches.transfer(name, thing, root, direction=[0.0, 0.0, 1.0]))
+    yield session
+    extension.unregister()
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [("solve", {}), ("solve", {"penetration": True}), ("settle", {"rounds": 1}), ("slide", {})],
+)
+def test_solving_accepts_and_keeps_residuals(bpy: Any, hand: Any, name: str, given: dict[str, Any]) -> None:
+    from contact_blender.extension import shared
+
+    before, after = one_step(bpy, hand, lambda: getattr(bpy.ops.contact, name)(**given))
+    assert after.poses and not before.poses
+    kept = shared.held()
+    assert kept is not None and set(kept.residuals) == set(after.pairs)
+    assert max(kept.residuals.values()) < 0.1 and kept.solved == hand.revision
+
+
+def test_solving_frames_keys_them_and_a_pose_is_cleared(bpy: Any, hand: Any) -> None:
+    assert bpy.ops.contact.solve(keyed=True, first=3, last=4) == {"FINISHED"}
+    rigged = next(iter(hand.rigs))
+    assert {3.0, 4.0} <= set(hand.host.pose_keys(hand.binding.surfaces[rigged].object_id))
+    bpy.ops.ed.undo()
+    assert bpy.ops.contact.solve() == {"FINISHED"} and rigged in hand.document.poses
+    _, after = one_step(bpy, hand, lambda: bpy.ops.contact.clear_pose(patch="thumb_distal"))
+    assert rigged not in after.poses
+
+
+def test_a_group_that_deforms_is_not_overwritten(bpy: Any, hand: Any) -> None:
+    with pytest.raises(RuntimeError, match="deforms the mesh"):
+        bpy.ops.contact.select(patch="thumb_distal", group="thumb_distal")
+
+
+def test_polls_say_why_not(bpy: Any, shared: Any) -> None:
+    for name, words in (("rotate", "no patch yet"), ("solve", "no pair yet"), ("pair", "no patch yet")):
+        with pytest.raises(RuntimeError, match=words):
+            getattr(bpy.ops.contact, name)()
+    painted(bpy, shared)
+    with pytest.raises(RuntimeError, match="one patch only"):
+        bpy.ops.contact.link()
+    bpy.context.view_layer.objects.active = None
+    with pytest.raises(RuntimeError, match="active object"):
+        bpy.ops.contact.paint()
+    choose(bpy, "left")
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="Tab leaves Edit Mode"):
+        bpy.ops.contact.paint()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "words"),
+    [
+        ("rotate", {"patch": "grop"}, "There is no patch 'grop'; there are: grip"),
+        ("paint", {"group": "nothing"}, "has no selection 'nothing'"),
+        ("paint", {"object": "nowhere"}, "Contacts lie on meshes"),
+        ("bend", {"patch": "grip", "point": 999}, "999"),
+        ("rename", {"patch": "grip", "name": ""}, "name"),
+    ],
+)
+def test_refusals_are_reports(bpy: Any, shared: Any, name: str, given: dict[str, Any], words: str) -> None:
+    session = painted(bpy, shared)
+    before = session.document
+    with pytest.raises(RuntimeError) as refused:  # Blender hands a script the reports of an operator as this
+        getattr(bpy.ops.contact, name)(**given)
+    assert words in str(refused.value) and "fault of the add-on" not in str(refused.value)
+    assert "Traceback" not in str(refused.value) and session.document is before
+
+
+def test_a_missing_library_is_a_sentence(bpy: Any, shared: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from contact_blender.extension import preferences
+
+    assert "All libraries are here" in preferences.words()
+    monkeypatch.setattr(shared, "LIBRARIES", ("numpy", "no_such_library"))
+    assert "no no_such_library" in preferences.words()
+    choose(bpy, "left")
+    with pytest.raises(RuntimeError, match="no_such_library"):
+        bpy.ops.contact.paint()
+    monkeypatch.undo()
+    monkeypatch.setattr(shared, "OLDEST_NUMPY", (99, 1))
+    assert "numpy 99.1 is needed" in preferences.words()
+
+
+def test_the_operators_say_what_they_do_and_push_no_step_of_their_own(bpy: Any, shared: Any) -> None:
+    from contact_blender.extension import operators
+
+    assert len(operators.classes()) >= 20
+    for kind in operators.classes():
+        assert kind.bl_options == {"REGISTER"} and len(kind.bl_description) > 15
+        assert getattr(bpy.ops.contact, kind.bl_idname.partition(".")[2]).get_rna_type().name == kind.bl_label
+
+
+def test_modes_are_those_of_the_undo(bpy: Any) -> None:
+    from contact_blender import storage, undo
+    from contact_blender.extension import declaring, shared
+
+    assert declaring.MODES == undo.WHOLE_SCENE and shared.KEY == storage.KEY
