@@ -348,6 +348,66 @@ def test_solving_frames_keys_them_and_a_pose_is_cleared(bpy: Any, hand: Any) -> 
     assert rigged not in after.poses
 
 
+def test_the_cursor_means_the_skin_as_it_is_posed(bpy: Any, hand: Any) -> None:
+    bpy.ops.contact.solve()
+    rigged = next(iter(hand.rigs))
+    posed, world = hand.geometry.posed_mesh(rigged), hand.document.surface(rigged).world_from_surface
+    rest = hand.geometry.mesh(rigged)
+    vertex = int(np.argmax(np.linalg.norm(posed.points - rest.points, axis=1)))
+    bpy.context.scene.cursor.location = (world @ np.append(posed.points[vertex], 1.0))[:3]
+    assert bpy.ops.contact.translate(patch="thumb_distal") == {"FINISHED"}
+    root = hand.geometry.root("thumb_distal").point().positions(hand.geometry.carrier(rigged))[0]
+    assert root == pytest.approx(rest.points[vertex], abs=1e-4 * np.ptp(rest.points))
+    assert np.linalg.norm(posed.points[vertex] - rest.points[vertex]) > 0.01 * np.ptp(rest.points)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_undo_and_edits_in_any_order_keep_scene_and_document_together(
+    bpy: Any, shared: Any, tmp_path: Any, seed: int
+) -> None:
+    """Our operators, Blender's own edits, undo, redo, reloading: what the scene stores is what the session has."""
+    painted(bpy, shared)
+    random = np.random.default_rng(seed)
+    path = str(tmp_path / "shot.blend")
+
+    def foreign() -> None:
+        bpy.data.objects["right"].location.z += 0.1
+        bpy.ops.ed.undo_push(message="Move")
+
+    def reload() -> None:
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+
+    def tried(run: Any, **given: Any) -> None:
+        if run.poll():
+            run(**given)
+
+    steps: list[Callable[[], object]] = [
+        lambda: tried(bpy.ops.contact.rotate, angle=float(random.uniform(-1.0, 1.0))),
+        lambda: tried(bpy.ops.contact.scale, along=float(random.uniform(0.6, 1.2))),
+        lambda: tried(bpy.ops.contact.transfer, object="right", pair=bool(random.integers(2))),
+        lambda: tried(bpy.ops.contact.remove),
+        lambda: choose(bpy, "left") and tried(bpy.ops.contact.paint),
+        foreign,
+        lambda: tried(bpy.ops.ed.undo),
+        lambda: tried(bpy.ops.ed.redo),
+        lambda: tried(bpy.ops.ed.undo),
+        reload,
+    ]
+    done = 0
+    for kind in random.choice(len(steps), 60, p=[0.12] * 8 + [0.02] * 2):
+        steps[kind]()
+        session = shared.session()
+        stored = session.host.stored_document()
+        known = stored.read("the scene").document if stored is not None else None
+        assert [*session.document.patches] == ([*known.patches] if known is not None else [])
+        assert session.document.pairs == known.pairs if known is not None else not session.document.pairs
+        assert stored is None or stored.stamp.revision == session.revision
+        assert [row.name for row in bpy.context.window_manager.contact.rows] == [*session.document.patches]
+        done = max(done, len(session.document.patches))
+    assert done > 1
+
+
 def test_a_group_that_deforms_is_not_overwritten(bpy: Any, hand: Any) -> None:
     with pytest.raises(RuntimeError, match="deforms the mesh"):
         bpy.ops.contact.select(patch="thumb_distal", group="thumb_distal")

@@ -110,6 +110,10 @@ def list_patches() -> None:
     for patch in document.patches.values():
         row = rows.add()
         row.name, row.color, row.pair = patch.name, patch.color, pair_of.get(patch.name, "")
+    for window in manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
 
 
 def keep_residuals(proposal: Proposal) -> None:
