@@ -111,6 +111,7 @@ class Application:
         self.drawer = Drawer(self._interaction, self.canvas)
         self.canvas.keep_surfaces(())
         self.see_all()
+        self._interaction.prepare()
 
     def _let_go(self) -> None:
         if self._interaction is not None:

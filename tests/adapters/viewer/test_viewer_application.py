@@ -331,4 +331,6 @@ def test_a_large_mesh_is_sent_once(hand: Hand) -> None:
     for _ in range(3):
         surface.set_shape(ball.points, ball.faces)
     assert surface._polygons.data.GetMTime() == uploaded
+    hand.wait()  # what is prepared beside the window on opening shows its progress
+    hand.front.tick()
     assert not hand.front.tick()
