@@ -17,6 +17,7 @@ from contact_core.errors import FileRefused
 
 def read_bounded(path: Path | str, max_bytes: int) -> bytes:
     """The bytes of a plain file of at most `max_bytes`. Raises FileRefused for any other."""
+    check_no_null(path)
     try:
         with open(path, "rb", opener=_open_nonblocking) as stream:  # the only one with an opener
             status = os.fstat(stream.fileno())
@@ -27,6 +28,12 @@ def read_bounded(path: Path | str, max_bytes: int) -> bytes:
             return stream.read()
     except OSError as error:
         raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
+
+
+def check_no_null(path: Path | str) -> None:
+    """Raises FileRefused where a path holds what the system raises a ValueError about, and no OSError."""
+    if "\0" in str(path):
+        raise FileRefused(f"no name of a file holds a null character, but got {str(path)!r}; leave it out.")
 
 
 def write_atomic(path: Path | str, data: bytes | str) -> None:
@@ -43,6 +50,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
     permissions. Raises FileRefused when the folder cannot be written.
     """
     path = Path(path)
+    check_no_null(path)
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f"{_prefix(target)}{secrets.token_hex(6)}{target.suffix}")
     try:

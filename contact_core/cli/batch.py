@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from contact_core.cli.numbers import finite
 from contact_core.cli.output import Output, columns
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Batch:
         parser.add_argument("--solver", metavar="NAME", help="of shots and documents")
         parser.add_argument("--assets", type=Path, metavar="DIR", help="where documents find the files of surfaces")
         parser.add_argument("--retries", type=int, default=2, metavar="N", help="after a worker died (2)")
-        parser.add_argument("--limit", type=float, metavar="SECONDS", help="for one job")
+        parser.add_argument("--limit", type=finite, metavar="SECONDS", help="for one job")
         parser.add_argument("--again", action="store_true", help="run also what is done")
         parser.add_argument(
             "--check", action="store_true", help="exit with 1 also where a result is beyond its limit"

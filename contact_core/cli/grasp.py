@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from contact_core.cli.numbers import finite
 from contact_core.cli.output import columns
 
 
@@ -27,12 +28,12 @@ class Grasp:
         )
         parser.add_argument(
             "--at",
-            type=float,
+            type=finite,
             nargs=3,
             metavar=("X", "Y", "Z"),
             help="the place of the object to hold, in its file",
         )
-        parser.add_argument("--scale", type=float, default=1.0, help="of the object, where its size is wrong (1)")
+        parser.add_argument("--scale", type=finite, default=1.0, help="of the object, where its size is wrong (1)")
         parser.add_argument("--seed", type=int, default=0, help="of everything random (0)")
         parser.add_argument("--check", action="store_true", help="exit with 1 when no good grasp was found")
 

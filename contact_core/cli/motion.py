@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contact_core.cli.frames import frames_of
+from contact_core.cli.numbers import finite
 from contact_core.cli.output import columns
 
 if TYPE_CHECKING:
@@ -25,13 +26,13 @@ class Motion:
         parser.add_argument("--frames", type=str, metavar="1,5,10-20", help="the film's own range by default")
         parser.add_argument("--detect", action="store_true", help="first find the contacts that the animation has")
         parser.add_argument(
-            "--follow", type=float, default=0.0, metavar="WEIGHT", help="keep to the animation that is there (0)"
+            "--follow", type=finite, default=0.0, metavar="WEIGHT", help="keep to the animation that is there (0)"
         )
         parser.add_argument(
             "--ground", action="store_true", help="what is followed is first moved as a whole to its contacts"
         )
-        parser.add_argument("--skate", type=float, metavar="WEIGHT", help="cost of contacts that slip (0.05)")
-        parser.add_argument("--tolerance", type=float, default=1.0, metavar="MM", help="of the keys (1 mm)")
+        parser.add_argument("--skate", type=finite, metavar="WEIGHT", help="cost of contacts that slip (0.05)")
+        parser.add_argument("--tolerance", type=finite, default=1.0, metavar="MM", help="of the keys (1 mm)")
         parser.add_argument("--no-pictures", action="store_true", help="no film strip and no movie")
 
     def run(self, arguments: argparse.Namespace) -> int:

@@ -302,7 +302,15 @@ def is_name(name: object) -> bool:
     return name.isprintable() and name == name.strip()
 
 
+def _spelt(name: object) -> str:
+    """What came in place of a name, cut to what fits a sentence."""
+    text = repr(name)
+    return text if len(text) <= 80 else f"{text[:60]}... of {len(text)} characters"
+
+
 def check_name(name: str, kind: str) -> None:
     """Raises InvalidInput unless `name` can be a name: printable, trimmed, not empty and of bounded length."""
     if not is_name(name):
-        raise InvalidInput(f"the name of {kind} is 1..{MAX_NAME} printable characters, trimmed; got {name!r}.")
+        raise InvalidInput(
+            f"the name of {kind} is 1..{MAX_NAME} printable characters, trimmed; got {_spelt(name)}."
+        )

@@ -26,6 +26,8 @@ from contact_core.rig.rig import Pose
 
 TrackKind = Literal["placement", "pose", "place", "weight"]
 FILM = "film"  # the one timeline that a document has
+MOST_FRAMES = 1_000_000  # of a film: eleven hours at 24 frames a second
+LARGEST_FRAME = 1e9  # beyond it the parts of a frame are lost to rounding, and then whole frames
 SURFACE = ("surface",)  # the one "joint" of an object that is placed
 
 
@@ -42,6 +44,11 @@ class Timeline:
             raise InvalidInput(f"a rate is a fraction of two positive whole numbers, but got {self.rate}.")
         if not -math.inf < self.first <= self.last < math.inf:
             raise InvalidInput(f"a range runs from a frame to a later one, but got {self.first} to {self.last}.")
+        if self.last - self.first > MOST_FRAMES or max(abs(self.first), abs(self.last)) > LARGEST_FRAME:
+            raise InvalidInput(
+                f"a range has at most {MOST_FRAMES} frames, none beyond {LARGEST_FRAME:g}, but got {self.first:g}"
+                f" to {self.last:g}."
+            )
 
     @property
     def frames_per_second(self) -> float:

@@ -98,21 +98,21 @@ def run_batch(
     began, settings, out = time.monotonic(), settings or BatchSettings(), Path(out)
     workers, plugins = workers or LocalWorkers(), plugins or PluginManager()
     run = _Run(settings, workers, progress)
-    with _alone(out):
-        try:
-            progress.tell(None, "Looking for jobs")
-            if settings.solver is not None:
-                plugins.get(POSE_SOLVERS, settings.solver)
-            jobs = find_jobs(sources, plugins.offers(JOB_KINDS), out)
-            tasks = _tasks(jobs, out, settings, plugins)
+    try:
+        progress.tell(None, "Looking for jobs")
+        if settings.solver is not None:
+            plugins.get(POSE_SOLVERS, settings.solver)
+        jobs = find_jobs(sources, plugins.offers(JOB_KINDS), out)
+        tasks = _tasks(jobs, out, settings, plugins)
+        with _alone(out):  # from here on the folder exists; a batch without jobs leaves none
             run.leave_out(tasks)
             try:
                 run.work()
             finally:
                 workers.stop()
                 result = _written(run, tasks, out, time.monotonic() - began)
-        finally:
-            workers.stop()
+    finally:
+        workers.stop()
     return result
 
 
@@ -135,7 +135,7 @@ def _alone(out: Path) -> Iterator[None]:
     check_writable(out, (SUMMARY, PAGE))
     lock = DocumentLock.take(out / SUMMARY)
     if isinstance(lock, str):
-        raise FileRefused(f"{out} is in use by another batch: {lock}. Wait for it, or name another folder.")
+        raise FileRefused(f"no batch can run in {out}: {lock}. Wait for the other to end, or name another folder.")
     try:
         yield
     finally:

@@ -6,6 +6,7 @@ which task it had: a pool of several breaks as a whole and does not say (ADR 005
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import multiprocessing
 import os
@@ -14,7 +15,7 @@ import sys
 import threading
 import time
 from abc import abstractmethod
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Protocol
@@ -23,6 +24,7 @@ from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.farm.task import Result, Task, perform
 
 _PATIENCE_S = 30.0  # that a scheduler may be silent while jobs run
+_MOST_WORKERS = 1000  # each is a process that holds some hundred megabytes
 KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 
 
@@ -101,8 +103,8 @@ class LocalWorkers(Workers):
     """count: processes; by default as many as this process may use cores. None starts before it has work."""
 
     def __init__(self, count: int | None = None) -> None:
-        if count is not None and count < 1:
-            raise InvalidInput(f"at least one worker was expected, but got {count}.")
+        if count is not None and not 1 <= count <= _MOST_WORKERS:
+            raise InvalidInput(f"from 1 to {_MOST_WORKERS} workers can be asked for, but {count} were.")
         self._slots = [_Slot() for _ in range(count or usable_cores())]
         self._busy: dict[Future[Result], _Slot] = {}
         self._warm = False
@@ -248,8 +250,9 @@ class DaskWorkers(Workers):
         except ImportError as error:
             raise MissingExtra("contact batch --scheduler", "farm") from error
         try:
+            _knock(address, seconds)
             self._client: Any = Client(address, timeout=seconds, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as error:
+        except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
             raise FileRefused(
                 f"no Dask scheduler answers at {address} ({' '.join(str(error).split())}). Start one with"
                 " `dask scheduler`, and workers with `dask worker ADDRESS --nthreads 1`."
@@ -296,6 +299,21 @@ class DaskWorkers(Workers):
         if self._is_connected:
             self._executor.shutdown(wait=False)  # of Dask's executor: cancels what runs and what waits
         self._client.close(timeout=5)
+
+
+def _knock(address: str, seconds: float) -> None:
+    """Connect and hang up: a Client that fails over its address alone leaves a loop that is waited for at exit, and
+    a traceback. In a thread of its own, for a notebook has a running loop. Raises what Dask raises."""
+    from distributed.core import connect
+    from distributed.security import Security
+
+    async def knock() -> None:
+        more = Security().get_connection_args("client")
+        comm = await connect(address, timeout=seconds, **more)
+        await comm.close()
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(lambda: asyncio.run(knock())).result()
 
 
 def usable_cores() -> int:

@@ -114,6 +114,8 @@ class GraspSettings:
         wrong = [kind for kind in self.kinds if kind not in KINDS]
         if wrong:
             raise InvalidInput(f"a grasp is one of {', '.join(KINDS)}, but {wrong[0]!r} was asked for.")
+        if self.at is not None and not np.isfinite(self.at).all():
+            raise InvalidInput(f"the place to hold is three finite numbers, but got {list(self.at)}.")
         if not 0 <= self.seed < 2**32:
             raise InvalidInput(f"the seed is a whole number from 0 to 2^32 - 1, but got {self.seed}.")
 

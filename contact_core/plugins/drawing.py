@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from contact_core.errors import ContactError, InvalidInput
+from contact_core.atomic_set import check_writable
+from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import RENDERERS
 from contact_core.scene.picture import Picture
@@ -25,8 +26,12 @@ def draw(
 ) -> Drawn:
     """Draw pictures side by side into a PNG of `size` pixels, with the best renderer that can.
 
-    Raises InvalidInput with what each renderer lacks where none can.
+    Raises FileRefused where `path` is no PNG file that can be written, and InvalidInput with what each renderer
+    lacks where none can.
     """
+    if path.suffix.lower() != ".png":
+        raise FileRefused(f"a picture is a PNG file, but got {str(path)!r}; name it like picture.png.")
+    check_writable(path.parent, [path.name])
     reasons: list[str] = []
     for renderer in sorted(plugins.offers(RENDERERS).values(), key=lambda r: (-r.priority, r.name)):
         try:

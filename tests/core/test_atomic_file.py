@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from contact_core.atomic_file import replacing, write_atomic
+from contact_core.atomic_file import read_bounded, replacing, write_atomic
 from contact_core.errors import FileRefused
 
 
@@ -44,3 +44,10 @@ def test_a_target_that_is_a_folder_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(FileRefused, match=r"cannot write .*taken"):
         write_atomic(tmp_path / "taken", b"")
     assert list(tmp_path.iterdir()) == [tmp_path / "taken"]
+
+
+def test_a_null_character_in_a_name_is_a_sentence(tmp_path: Path) -> None:
+    for action in (lambda path: write_atomic(path, b"new"), lambda path: read_bounded(path, 10)):
+        with pytest.raises(FileRefused, match="null character"):
+            action(tmp_path / "a\0b")
+    assert not list(tmp_path.iterdir())

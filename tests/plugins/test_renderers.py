@@ -16,6 +16,8 @@ from contact_builtins.renderers.software import OVERSAMPLE, SoftwareRenderer, dr
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
+from contact_core.plugins.drawing import draw as draw_with_plugins
+from contact_core.plugins.manager import PluginManager
 from contact_core.scene.camera import LEGEND_AT, LEGEND_ROWS, ROW, camera_of, legend_rows, rows_above
 from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.testing.meshes import icosphere, torus
@@ -151,6 +153,21 @@ def test_pictures_stand_side_by_side(tmp_path: Path) -> None:
     assert OVERSAMPLE == 2
     SoftwareRenderer().render([Picture((ball,))] * 3, tmp_path / "three.png", size=(160, 80))
     assert decoded((tmp_path / "three.png").read_bytes()).shape == (80, 160, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("x.txt", "is a PNG file"), ("x", "is a PNG file"), ("a\0b.png", "null character"),
+                       ("file/x.png", "is not a folder"), ("folder.png", "it is a folder")],
+)  # fmt: skip
+def test_a_path_that_takes_no_picture_is_refused_once_and_not_by_each_renderer(
+    name: str, says: str, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(FileRefused, match=says) as refusal:
+        draw_with_plugins([], tmp_path / name, PluginManager())
+    assert "renderer" not in str(refusal.value)
+    assert {entry.name for entry in tmp_path.iterdir()} == {"file", "folder.png"}
 
 
 def test_refusals(tmp_path: Path) -> None:

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from contact_core.document.codec import MAX_DEPTH
+from contact_core.document.document import check_name
 from contact_core.document.schema import dump_document, inconsistencies, parse_document
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.testing.random_commands import random_document
 
 Data = dict[str, Any]
@@ -112,3 +113,10 @@ def test_checking_a_long_chain_costs_its_length(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(kind, "__getitem__", lambda self, key: (looked_up.append(key), real(self, key))[1])
     assert list(inconsistencies(document)) == []
     assert len(looked_up) <= 10 * count
+
+
+@pytest.mark.parametrize("name", ["", " a", "a\0b", "a" * 10_000, "\x1b" * 10_000])
+def test_a_name_that_is_none_is_told_in_a_short_sentence(name: str) -> None:
+    with pytest.raises(InvalidInput, match="printable characters") as refusal:
+        check_name(name, "a surface")
+    assert len(str(refusal.value)) < 200

@@ -211,6 +211,8 @@ def test_times_that_mean_nothing_are_refused_in_words() -> None:
         ("has none", "spans", {"timed": []}),
         ("does not exist", "tracks", {"pose/nobody": {"keys": [{"is": "WeightKey", "frame": 0.0, "weight": 1.0}]}}),
         ("a track is one of", "tracks", {"x": {"keys": [{"is": "WeightKey", "frame": 0.0, "weight": 1.0}]}}),
+        ("at most 1000000 frames", "timelines", {"film": {"rate": [24, 1], "first": 0.0, "last": 1e12}}),
+        ("none beyond 1e\\+09", "timelines", {"film": {"rate": [24, 1], "first": 1e17, "last": 1e17}}),
         ("at least one", "tracks", {"weight/timed": {"keys": []}}),
     ],
 )
