@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from contact_core.atomic_file import check_no_null
 from contact_core.errors import FileRefused
 
 _STAGING = ".contact-staging-"
@@ -62,8 +61,6 @@ def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
 
 def check_writable(folder: Path, names: Collection[str]) -> None:
     """Raises FileRefused when `names` cannot be written into `folder`: told before the work, not after it."""
-    for path in (folder, *names):
-        check_no_null(path)
     there = next(place for place in (folder, *folder.absolute().parents) if os.path.lexists(place))
     if not there.is_dir():
         raise FileRefused(f"cannot write into {folder}: {there} is not a folder. Name another folder.")

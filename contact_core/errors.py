@@ -5,6 +5,21 @@ One small family. Code that talks to people (the command line, an adapter's pane
 """
 
 
+def quoted(value: object, most: int = 60) -> str:
+    """What came, as Python spells it, cut to what fits a sentence: a file may hold a text of a million letters."""
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of thousands of digits, written in base 16
+        return "a number without end"
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def shortened(text: str, most: int = 500) -> str:
+    """A sentence that is not longer than people read: its beginning and its end say what is wrong with the rest."""
+    half = most // 2 - 2
+    return text if len(text) <= most else f"{text[:half]}...{text[-half:]}"
+
+
 class ContactError(Exception):
     """Base of every error that this project raises on purpose. Its text is meant for people."""
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from numbers import Integral, Real
 from typing import Any, Literal, TypeAlias, TypeVar, Union, overload
 
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, quoted
 
 T = TypeVar("T")
 Kind: TypeAlias = Literal["number", "count", "flag", "text", "choice", "vector", "texts", "numbers"]
@@ -80,7 +80,7 @@ class Setting:
         if value is None and self.optional:
             return None
         if not self._is_of_kind(value):
-            raise InvalidInput(f"{self.name} is {_SPELT[self.kind]}, but got {_spelt(value)}.")
+            raise InvalidInput(f"{self.name} is {_SPELT[self.kind]}, but got {quoted(value)}.")
         parts = list(value) if isinstance(value, (list, tuple)) else [value]
         if self.kind in ("number", "vector", "numbers"):
             parts = [float(part) for part in parts]
@@ -266,8 +266,3 @@ def _is_number(value: Any) -> bool:
 def _name_of(thing: object) -> str:
     name = getattr(thing, "name", None)
     return name if isinstance(name, str) else type(thing).__name__
-
-
-def _spelt(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar, overload
 
-from contact_core.errors import InvalidInput
+from contact_core.errors import InvalidInput, quoted
 
 T = TypeVar("T")
 Vector = tuple[float, float, float]
@@ -34,7 +34,7 @@ class Table:
 
     def __init__(self, values: Any, where: str) -> None:
         if not isinstance(values, Mapping):
-            raise InvalidInput(f"{where} must be a table, but got {_spell(values)}.")
+            raise InvalidInput(f"{where} must be a table, but got {quoted(values)}.")
         self.values, self.where = values, where
         self._asked: set[str] = set()
 
@@ -138,7 +138,7 @@ class Table:
         """The tables of a list `[[key]]`, of which there is at least one."""
         value = self.raw(key)
         if not _is_list(value, 1000) or not value:
-            raise InvalidInput(f"{self.where}.{key} must be a list of tables, [[{key}]], but got {_spell(value)}.")
+            raise InvalidInput(f"{self.where}.{key} must be a list of tables, [[{key}]], but got {quoted(value)}.")
         yield from (Table(item, f"{self.where}.{key}[{place}]") for place, item in enumerate(value))
 
     def one_or_more(self, key: str) -> Iterator[Table]:
@@ -160,7 +160,7 @@ class Table:
     def _checked(self, key: str, default: Any, wanted: str, fits: Any) -> Any:
         value = self.raw(key, default)
         if key in self.values and not fits(value):
-            raise InvalidInput(f"{self.where}.{key} must be {wanted}, but got {_spell(value)}.")
+            raise InvalidInput(f"{self.where}.{key} must be {wanted}, but got {quoted(value)}.")
         return value
 
 
@@ -174,14 +174,6 @@ def _is_vector(value: Any) -> bool:
 
 def _is_list(value: Any, longest: int) -> bool:
     return isinstance(value, list) and len(value) <= longest
-
-
-def _spell(value: Any) -> str:
-    try:
-        text = repr(value)
-    except ValueError:  # a whole number of thousands of digits, written in base 16
-        return "a number without end"
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _is_counts(value: Any) -> bool:

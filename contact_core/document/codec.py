@@ -19,7 +19,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.errors import ContactError, FileRefused
+from contact_core.errors import ContactError, FileRefused, quoted, shortened
 
 MAX_ARRAY = 50_000_000  # numbers in one array: beyond any patch, below any memory bomb
 MAX_DEPTH = 100  # levels of free JSON data: writing and reading go a few calls deep for each
@@ -61,7 +61,7 @@ def from_json(annotation: Any, data: Any, where: str = "value") -> Any:
     except FileRefused:
         raise
     except (ContactError, ValueError, TypeError, OverflowError) as error:
-        raise FileRefused(f"{where} does not fit: {error}") from error
+        raise FileRefused(f"{where} does not fit: {shortened(str(error))}") from error
 
 
 def freeze_json(data: Any, depth: int = 0) -> Any:
@@ -192,7 +192,7 @@ def _decoder(annotation: Any) -> Decoder:
 
 def _decode_literal(choices: tuple[Any, ...], data: Any, where: str) -> Any:
     if data not in choices:
-        raise FileRefused(f"{where} is one of {choices}, but got {data!r}.")
+        raise FileRefused(f"{where} is one of {choices}, but got {quoted(data)}.")
     return data
 
 
@@ -217,7 +217,7 @@ def _decode_scalar(annotation: Any, data: Any, where: str) -> Any:
         return _finite(float(data), where)
     if annotation is complex and isinstance(data, list) and len(data) == 2:
         return complex(_finite(float(data[0]), where), _finite(float(data[1]), where))
-    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but got {str(data)[:60]!r}.")
+    raise FileRefused(f"{where} wants {getattr(annotation, '__name__', annotation)}, but got {quoted(data)}.")
 
 
 def _union_decoder(annotation: Any) -> Decoder:
@@ -240,7 +240,7 @@ def _decode_tagged(members: Mapping[Any, Decoder], data: Any, where: str) -> Any
     kind = _object(data, where).get("is")
     if isinstance(kind, str) and kind in members:
         return members[kind](data, where)
-    raise FileRefused(f'{where} needs a key "is" that is one of {", ".join(members)}, but got {kind!r}.')
+    raise FileRefused(f'{where} needs a key "is" that is one of {", ".join(members)}, but got {quoted(kind)}.')
 
 
 def _tuple_decoder(item_types: tuple[Any, ...]) -> Decoder:
@@ -261,7 +261,7 @@ def _decode_tuple(items: tuple[Decoder, ...], data: Any, where: str) -> tuple[An
 
 def _decode_array(dtype: np.dtype[Any], data: Any, where: str) -> np.ndarray[Any, Any]:
     if not isinstance(data, list) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list of numbers, but got {str(data)[:60]!r}.")
+        raise FileRefused(f"{where} wants a list of numbers, but got {quoted(data)}.")
     complex_wanted = dtype.kind == "c"
     raw = np.array(data, dtype=np.float64 if complex_wanted else None)
     if raw.dtype.kind not in "biuf" or (raw.dtype.kind == "f" and not np.isfinite(raw).all()):
@@ -284,7 +284,7 @@ def _decode_dataclass(cls: type, data: Any, where: str) -> Any:
     fields = _field_decoders(cls)
     unknown = sorted(items.keys() - fields.keys())
     if unknown:
-        raise FileRefused(f"{where} has no field {unknown[0]!r}; it has {', '.join(fields)}.")
+        raise FileRefused(f"{where} has no field {quoted(unknown[0])}; it has {', '.join(fields)}.")
     values = {}
     for name, (decoder, needed) in fields.items():
         if name in items:
@@ -294,7 +294,7 @@ def _decode_dataclass(cls: type, data: Any, where: str) -> Any:
     try:
         return cls(**values)
     except ContactError as error:
-        raise FileRefused(f"{where} does not fit: {error}") from error
+        raise FileRefused(f"{where} does not fit: {shortened(str(error))}") from error
 
 
 @cache
@@ -309,19 +309,19 @@ def _field_decoders(cls: type) -> Mapping[str, tuple[Decoder, bool]]:
 
 def _object(data: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
-        raise FileRefused(f"{where} wants an object, but got {str(data)[:60]!r}.")
+        raise FileRefused(f"{where} wants an object, but got {quoted(data)}.")
     return typing.cast("Mapping[str, Any]", data)
 
 
 def _list(data: Any, where: str) -> Sequence[Any]:
     if not isinstance(data, (list, tuple)) or len(data) > MAX_ARRAY:
-        raise FileRefused(f"{where} wants a list, but got {str(data)[:60]!r}.")
+        raise FileRefused(f"{where} wants a list, but got {quoted(data)}.")
     return data
 
 
 def _text(data: Any, where: str) -> str:
     if not isinstance(data, str):
-        raise FileRefused(f"{where} wants a text, but got {str(data)[:60]!r}.")
+        raise FileRefused(f"{where} wants a text, but got {quoted(data)}.")
     return data
 
 

@@ -18,7 +18,7 @@ from contact_core.contact.placement import Link, Placement
 from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.timeline import FILM, Span, Timeline, Track, gain_of, of_address
-from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.errors import CommandRejected, InvalidInput, quoted
 from contact_core.geometry.transform import is_rigid
 from contact_core.rig.rig import Pose
 
@@ -302,15 +302,9 @@ def is_name(name: object) -> bool:
     return name.isprintable() and name == name.strip()
 
 
-def _spelt(name: object) -> str:
-    """What came in place of a name, cut to what fits a sentence."""
-    text = repr(name)
-    return text if len(text) <= 80 else f"{text[:60]}... of {len(text)} characters"
-
-
 def check_name(name: str, kind: str) -> None:
     """Raises InvalidInput unless `name` can be a name: printable, trimmed, not empty and of bounded length."""
     if not is_name(name):
         raise InvalidInput(
-            f"the name of {kind} is 1..{MAX_NAME} printable characters, trimmed; got {_spelt(name)}."
+            f"the name of {kind} is 1..{MAX_NAME} printable characters, trimmed; got {quoted(name)}."
         )

@@ -17,7 +17,7 @@ from contact_core.document.codec import Fragment, from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, Patch, is_name
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.time_checks import time_inconsistencies
-from contact_core.errors import EditedFile, FileRefused
+from contact_core.errors import EditedFile, FileRefused, shortened
 
 SCHEMA = "contact-core.document"
 VERSION = 1
@@ -39,7 +39,7 @@ def document_from_json(data: Any, source: str = "the document") -> ContactDocume
     body = open_envelope(data, SCHEMA, VERSION, UPGRADES, source)
     document: ContactDocument = from_json(ContactDocument, body, source)
     for problem in inconsistencies(document):
-        raise FileRefused(f"{source} contradicts itself: {problem}")
+        raise FileRefused(f"{source} contradicts itself: {shortened(problem)}")
     return document
 
 

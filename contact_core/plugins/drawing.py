@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from contact_core.atomic_file import check_no_null
 from contact_core.atomic_set import check_writable
 from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.plugins.manager import PluginManager
@@ -31,6 +32,7 @@ def draw(
     """
     if path.suffix.lower() != ".png":
         raise FileRefused(f"a picture is a PNG file, but got {str(path)!r}; name it like picture.png.")
+    check_no_null(path)
     check_writable(path.parent, [path.name])
     reasons: list[str] = []
     for renderer in sorted(plugins.offers(RENDERERS).values(), key=lambda r: (-r.priority, r.name)):

@@ -120,3 +120,14 @@ def test_a_name_that_is_none_is_told_in_a_short_sentence(name: str) -> None:
     with pytest.raises(InvalidInput, match="printable characters") as refusal:
         check_name(name, "a surface")
     assert len(str(refusal.value)) < 200
+
+
+@pytest.mark.parametrize("value", ["a" * 100_000, [1] * 10_000, {"is": "b" * 100_000}])
+@pytest.mark.parametrize("field", ["surface", "placement", "original", "name"])
+def test_what_came_is_cut_to_a_sentence(field: str, value: Any) -> None:
+    data = json.loads(dump_document(random_document(2, 20)))
+    data["digest"] = None
+    first(data["patches"])[field] = value
+    with pytest.raises(FileRefused) as refusal:
+        parse_document(json.dumps(data).encode())
+    assert len(str(refusal.value)) < 1000
