@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected
+from contact_core.grasping.filled import KeepOutOfHollowsTerm
 from contact_core.interaction.overlay import Ghost, Overlay
 from contact_core.interaction.work import Worker
 from contact_core.plugins.registry import GRASP_SAMPLERS, POSE_TERMS
 from contact_core.progress import Progress
 from contact_core.proposals.draft import Draft
 from contact_core.scene.problem import Objective
-from contact_core.solve.terms import paper_terms
+from contact_core.solve.terms import PoseTerm, paper_terms
 
 if TYPE_CHECKING:
     from contact_core.grasping.suggest import Suggestion
@@ -138,8 +139,7 @@ class Proposing:
         self.dismiss()
         terms = paper_terms(prior=settings.prior_weight)
         if settings.penetration and settings.penetration_weight > 0.0 and session.plugins.offers(POSE_TERMS):
-            name = session.plugins.name_for(POSE_TERMS, "depth")
-            terms += (session.plugins.make(POSE_TERMS, name, weight=settings.penetration_weight),)
+            terms += (self._depth(),)
         poses = dict(session.document.poses)
         objective = Objective(terms) if settings.prior == "rest" else Objective(terms, prior=poses)
         start, derived, rigs = session.document, session.derived.apart(), dict(session.rigs)
@@ -151,6 +151,14 @@ class Proposing:
             return find(start, draft, SolveSettings(solver, objective=objective, progress=progress))
 
         self._worker.begin(title, work, self.show)
+
+    def _depth(self) -> PoseTerm:
+        settings, plugins = self._desk.settings, self._desk.session.plugins
+        if settings.hollows:
+            return KeepOutOfHollowsTerm(weight=settings.penetration_weight)
+        name = plugins.name_for(POSE_TERMS, "depth")
+        term: PoseTerm = plugins.make(POSE_TERMS, name, weight=settings.penetration_weight)
+        return term
 
     def show(self, proposal: Proposal) -> None:
         """Show a proposal in place of the document, until it is accepted or dismissed.

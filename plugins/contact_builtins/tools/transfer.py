@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -12,6 +12,7 @@ from contact_builtins.tools.join import in_order
 from contact_builtins.tools.move import as_seen, heading_to
 from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Root
+from contact_core.document.document import ContactDocument
 from contact_core.errors import ContactError, NotManifold
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import heading_to_direction
@@ -39,6 +40,7 @@ class Transfer(HasSettings):
     )
     tree: bool = setting(True, help="what hangs on the patch is copied with it")
     pair: bool = setting(True, help="a copy on another surface is paired with its original at once")
+    onward: bool = setting(True, help="after a pair, the next patch there that has none yet is the active one")
     mirrored: Mirrored = setting("auto", help="as the mirror image; auto: on another surface, as contact wants it")
 
     def hover(self, desk: Desk, pointer: Pointer) -> Overlay:
@@ -78,11 +80,20 @@ class Transferring(Drag):
         super().__init__(desk, pointer)
         self.tool, self.source, self.root = tool, source, hit
         self.default = _along(desk, source, hit)
-        self.copy = source
+        self.copy, self.selected = source, desk.selection
         self.drag(pointer)
 
     def move(self, pointer: Pointer) -> None:
         self.drag(pointer)
+
+    def release(self, pointer: Pointer) -> None:
+        super().release(pointer)
+        following = _next_unpaired(self.desk.document, self.source) if self.tool.onward else None
+        if following is not None:
+            self.desk.selection = replace(self.desk.selection, patches=(following,))
+
+    def cancel(self) -> None:
+        self.desk.selection = self.selected
 
     def drag(self, pointer: Pointer) -> None:
         far = float(np.linalg.norm(pointer.pixel - self.start.pixel)) > 6.0 * self.desk.view.pixel_ratio
@@ -117,6 +128,15 @@ class Transferring(Drag):
 
     def hint(self) -> str:
         return f"{self.copy}: drag along its axis"
+
+
+def _next_unpaired(document: ContactDocument, source: str) -> str | None:
+    """The next patch on the surface of one that is paired now, round and round, that has no pair yet."""
+    paired = {end for pair in document.pairs.values() for end in (pair.manipulator, pair.object)}
+    names = [name for name, patch in document.patches.items() if patch.surface == document.patch(source).surface]
+    after = names.index(source)
+    free = (name for name in names[after:] + names[:after] if name not in paired)
+    return next(free, None) if source in paired else None
 
 
 def _along(desk: Desk, source: str, hit: Hit) -> FloatArray:
