@@ -12,21 +12,18 @@ import numpy as np
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.document_geometry import DocumentGeometry
-from contact_core.edit.editor import Makers
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import Handle, handle_under
 from contact_core.interaction.seen import Hit, SeenScene
 from contact_core.interaction.settings import InteractionSettings, Selection
 from contact_core.interaction.view import View
 from contact_core.plugins.registry import TOOLS, Slot
-from contact_core.proposals.draft import Draft
+from contact_core.proposals.draft import RecordingDraft
 from contact_core.solve.terms import PoseTerm
 
 if TYPE_CHECKING:
-    from contact_core.edit.derived import Derived
     from contact_core.edit.stroke import Stroke
     from contact_core.interaction.tool import Tool
-    from contact_core.rig.rig import Rig
     from contact_core.session import Session
 
 
@@ -151,13 +148,14 @@ class Desk:
         if self._stroke is not None and self._stroke.command is not None:
             self._stroke.cancel()
 
-    def together(self) -> Together:
-        """An editor that gathers several verbs, from the document at the press, for `preview`."""
-        return Together(self.stroke.document, self.session.derived, self.session.rigs, self.session.makers)
+    def draft(self) -> RecordingDraft:
+        """A draft for several verbs, from the document at the press, for `preview`."""
+        session = self.session
+        return RecordingDraft(self.stroke.document, session.derived, session.rigs, makers=session.makers)
 
-    def preview(self, title: str, gathered: Together) -> None:
-        """Preview what was gathered as one step. Raises CommandRejected."""
-        self.stroke.do(Macro(title, tuple(gathered.commands)))
+    def preview(self, title: str, draft: RecordingDraft) -> None:
+        """Preview what was done to a draft as one step. Raises CommandRejected."""
+        self.stroke.do(Macro(title, draft.commands))
 
     def commit(self) -> None:
         """End the stroke with what it previews, as one step of the session; nothing where it previews nothing."""
@@ -179,20 +177,6 @@ class Desk:
     def _over(self) -> None:
         self._stroke, self.pins, self.held, self.settled = None, (), (), False
         self.follow()
-
-
-class Together(Draft):
-    """A draft that remembers its commands."""
-
-    def __init__(
-        self, document: ContactDocument, derived: Derived, rigs: Mapping[str, Rig], makers: Makers | None = None
-    ) -> None:
-        super().__init__(document, derived, rigs, makers=makers)
-        self.commands: list[Command] = []
-
-    def do(self, command: Command, *, origin: str = "user") -> None:
-        super().do(command, origin=origin)
-        self.commands.append(command)
 
 
 def _spacing(at: Any) -> float:

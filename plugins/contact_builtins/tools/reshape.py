@@ -76,10 +76,10 @@ class Bending(Drag):
         if heading is None:
             return
         self.angle = cmath.phase(heading / self.first)
-        together = self.desk.together()
+        draft = self.desk.draft()
         for point, share in self.shares:
-            together.patches.bend(self.patch, point, share * self.angle)
-        self.desk.preview(f"Bend {self.patch}", together)
+            draft.patches.bend(self.patch, point, share * self.angle)
+        self.desk.preview(f"Bend {self.patch}", draft)
 
     def overlay(self) -> Overlay:
         return shown_handles(self.desk)

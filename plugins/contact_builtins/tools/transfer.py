@@ -16,12 +16,12 @@ from contact_core.document.document import ContactDocument
 from contact_core.errors import ContactError, NotManifold
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import heading_to_direction
-from contact_core.interaction.desk import Desk, Together
+from contact_core.interaction.desk import Desk
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import NOTHING, Ghost, Overlay
 from contact_core.interaction.seen import Hit
 from contact_core.interaction.tool import Gesture
-from contact_core.proposals.draft import Draft
+from contact_core.proposals.draft import Draft, RecordingDraft
 from contact_core.settings import HasSettings, setting
 
 Mirrored: TypeAlias = Literal["auto", "yes", "no"]
@@ -98,16 +98,16 @@ class Transferring(Drag):
     def drag(self, pointer: Pointer) -> None:
         far = float(np.linalg.norm(pointer.pixel - self.start.pixel)) > 6.0 * self.desk.view.pixel_ratio
         end = self.hit(pointer, self.root.surface) if far else None
-        together = self.desk.together()
+        draft = self.desk.draft()
         given: dict[str, Any] = {"direction": self.default}
         if end is not None:
             given = self._toward(end.point) or given
-        names = together.patches.transfer_tree(
+        names = draft.patches.transfer_tree(
             self.source, self.root.surface, self.root.point, descendants=self.tool.tree,
             mirrored=self.tool.is_mirrored(self.desk, self.source, self.root.surface, pointer), **given,
         )  # fmt: skip
         self.copy = names[self.source]
-        self.desk.preview(f"Transfer {self.source}", self._paired(together, names))
+        self.desk.preview(f"Transfer {self.source}", self._paired(draft, names))
 
     def _toward(self, end: SurfacePoints) -> dict[str, Any]:
         """The heading at the root toward another point, as verbs take it; nothing where the two are one place."""
@@ -120,11 +120,11 @@ class Transferring(Drag):
             return {"direction": end.positions(mesh)[0] - self.root.point.positions(mesh)[0]}
         return {} if heading is None else as_seen(shown, surface, Root.at(ends[0], heading))[1]
 
-    def _paired(self, together: Together, names: dict[str, str]) -> Together:
+    def _paired(self, draft: RecordingDraft, names: dict[str, str]) -> RecordingDraft:
         if self.tool.pair and self.desk.document.patch(self.source).surface != self.root.surface:
             for name, copy in names.items():
-                together.pairs.add(*in_order(together.document, name, copy))
-        return together
+                draft.pairs.add(*in_order(draft.document, name, copy))
+        return draft
 
     def hint(self) -> str:
         return f"{self.copy}: drag along its axis"
