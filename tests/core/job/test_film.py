@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import contact_core as contact
 from contact_core.cli import main
@@ -47,15 +46,16 @@ def test_a_film_is_solved_keyed_reported_and_drawn(scene: Path, capsys: pytest.C
 
 
 def test_a_strip_and_a_movie(scene: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="Pillow, which makes movies, is not installed")
     with contact.open(scene) as session:
         frames = [0.0, 8.0, 20.0]
         write_strip(session, frames, scene.parent / "strip.png", count=2, panel=(48, 40))
         write_movie(session, frames, scene.parent / "film.gif", size=(48, 40))
         with pytest.raises(contact.InvalidInput, match="a movie has"):
             write_movie(session, [], scene.parent / "none.gif")
-    with Image.open(scene.parent / "strip.png") as strip:
+    with image.open(scene.parent / "strip.png") as strip:
         assert strip.size == (96, 40)
-    with Image.open(scene.parent / "film.gif") as movie:
+    with image.open(scene.parent / "film.gif") as movie:
         assert movie.n_frames == 3 and movie.info["duration"] in (40, 42)  # hundredths of a second
 
 
