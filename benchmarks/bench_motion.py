@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from harness import record
@@ -191,9 +191,10 @@ def keying() -> dict[str, Any]:
     rig = motion.problems[0].bodies[motion.problems[0].body_index(body)].rig
     poses = solution.poses(body)
     rows: dict[str, Any] = {}
-    for kind in ("cubic", "linear"):
+    kinds: tuple[Literal["cubic", "linear"], ...] = ("cubic", "linear")
+    for kind in kinds:
         began = time.process_time()
-        done = reduce_poses(rig, motion.frames, poses, interpolation=kind)  # type: ignore[arg-type]
+        done = reduce_poses(rig, motion.frames, poses, interpolation=kind)
         seconds = time.process_time() - began
         rows[f"120 frames to {kind} keys at 1 mm{' (<= 12)' if kind == 'cubic' else ''}: keys; skin mm; s"] = (
             f"{len(done.keys.frames)}; {MM * rig.meters_per_unit * done.error:.2f}; {seconds:.2f}"

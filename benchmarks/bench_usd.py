@@ -90,14 +90,21 @@ def editing(repeats: int) -> dict[str, str]:
     arm = host.add(Asset("arm", rig.surface, rig, meters_per_unit=1.0))
     session = host_edits.painted(host, key)
     rows = host_edits.edits(host, session, repeats)
-    publish = lambda: contacts.publish(host, session, {"sheet": key})  # noqa: E731
+    frames = iter(range(1000))
+
+    def publish() -> None:
+        contacts.publish(host, session, {"sheet": key})
+
+    def turn() -> None:
+        session.patches.rotate("patch 0", 0.01)
+
+    def key_pose() -> None:
+        host.write_pose(arm, bent(rig, 1), float(next(frames)))
+
     rows["publish all patches"] = host_edits.spelled(lambda: (_unpublish(host), publish()), 5)
-    turn = lambda: session.patches.rotate("patch 0", 0.01)  # noqa: E731
     rows["rotate, all patches published"] = host_edits.spelled(turn, repeats, host_edits.BAR)
     rows["rotate and publish what that changed"] = host_edits.spelled(lambda: (turn(), publish()), repeats)
     rows["publish nothing new"] = host_edits.spelled(publish, repeats)
-    frames = iter(range(1000))
-    key_pose = lambda: host.write_pose(arm, bent(rig, 1), float(next(frames)))  # noqa: E731
     rows["key a pose"] = host_edits.spelled(key_pose, repeats)
     return rows
 

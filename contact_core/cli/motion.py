@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.cli.frames import frames_of
 from contact_core.cli.numbers import finite
@@ -87,8 +87,8 @@ def _solved(
     settings = MotionSettings(
         MotionWeights(**given), tolerance=1e-3 * arguments.tolerance, grounded=arguments.ground
     )
-    prior = "current" if arguments.follow > 0.0 else "rest"
-    found = session.solve(frames=frames, motion=settings, prior=prior, progress=progress)  # type: ignore[arg-type]
+    prior: Literal["current", "rest"] = "current" if arguments.follow > 0.0 else "rest"
+    found = session.solve(frames=frames, motion=settings, prior=prior, progress=progress)
     if found.after.status is SolveStatus.CANCELLED:
         raise Cancelled("it was cancelled; nothing was written.")
     assert isinstance(found, MotionProposal)

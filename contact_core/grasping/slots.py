@@ -90,7 +90,7 @@ class GraspSampler(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class GraspFacts:
-    """What is known of one solved grasp. metrics: those of `report.json`. kind: which was wanted.
+    """What is known of one solved grasp. metrics: those of `report.json`. kind: the one asked for.
 
     closure: Ferrari-Canny quality. comfort: 0 to 1, 1 where joints are in the middle of their room and bent alike.
     clearance: 0 to 1, the share of the way back out that the open hand finds free.

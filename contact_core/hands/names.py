@@ -65,12 +65,15 @@ def words_of(name: str) -> list[str]:
     return re.findall(r"[a-z]+|\d+|[^\W\d_a-z]+", spaced.lower())
 
 
+_SIDES: tuple[tuple[Side, str, str], ...] = (("left", "l", "左"), ("right", "r", "右"))
+
+
 def side_of(name: str) -> Side:
     """Left, right, or neither."""
     words = words_of(name)
-    for side, short, sign in (("left", "l", "左"), ("right", "r", "右")):
+    for side, short, sign in _SIDES:
         if side in words or short in words or any(w.startswith((side, sign)) or w.endswith(side) for w in words):
-            return side  # type: ignore[return-value]
+            return side
     return ""
 
 

@@ -228,7 +228,7 @@ def transfer(document: ContactDocument, rng: Rng) -> Command | None:
     copy = new_patch(document, rng, document.free_name("copy"), surface)
     copy = replace(copy, shape=patch.shape, original=False, mirrored=not patch.mirrored)
     copies = [copy]
-    for name in list(document.children(patch.name))[:2]:  # what hangs on it comes along
+    for name in list(document.children(patch.name))[:2]:  # its children come along
         child = replace(document.patch(name), name=document.free_name(f"{name} too"), surface=surface.name)
         link = replace(random_link(rng, document, patch.name, child), parent=copy.name)
         copies.append(replace(child, placement=link, original=False))

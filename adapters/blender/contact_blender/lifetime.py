@@ -33,6 +33,6 @@ class SceneEnd:
         for listener in tuple(self._listeners):
             listener()
 
-    @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+    @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]  # bpy ships no types
     def _before(self, *_: Any) -> None:
         self.closed()

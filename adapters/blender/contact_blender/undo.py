@@ -97,7 +97,7 @@ class UndoBridge:
             bpy.ops.ed.undo_push(message="Original")
         self._based_on = scene.session_uid
 
-    @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+    @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]  # bpy ships no types
     def _after(self, *_: Any) -> None:
         for listener in tuple(self._listeners):
             try:

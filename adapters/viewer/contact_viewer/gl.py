@@ -34,7 +34,7 @@ def screen_window(size: tuple[int, int], title: str) -> Any:
     """A vtkRenderWindow on the screen. Where there is none, VTK would end the process: ask `has_screen` first."""
     import vtkmodules.vtkRenderingFreeType
     import vtkmodules.vtkRenderingOpenGL2
-    import vtkmodules.vtkRenderingUI  # noqa: F401
+    import vtkmodules.vtkRenderingUI  # noqa: F401  (registers what the factories make)
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
     window = vtkRenderWindow()

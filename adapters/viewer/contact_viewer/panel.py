@@ -86,7 +86,7 @@ def tree(
     hidden_surfaces: Iterable[str],
     hidden_patches: Iterable[str],
 ) -> list[dict[str, Any]]:
-    """The rows of the tree: surfaces, below each its patches, below those what hangs on them."""
+    """The rows of the tree: surfaces, below each its patches, below those their children."""
     document, selection = session.document, interaction.selection
     by_patch = {name: each for each in meets for name in each.patches}
     partner = {pair.manipulator: pair.object for pair in document.pairs.values()}

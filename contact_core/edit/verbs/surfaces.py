@@ -68,7 +68,7 @@ class Surfaces(VerbGroup):
                 f"{name!r} is another mesh now ({known.points} points and {known.faces} faces before,"
                 f" {wanted.points} and {wanted.faces} now): use rebind to project its contacts onto the new one."
             )
-        self._editor.derived.bring(mesh)  # before the command: who is told of it may ask for the mesh
+        self._editor.derived.bring(mesh)  # before the command: its listeners may ask for the mesh
         if rig is not None:
             self._editor.rigs[name] = rig
         if known is None:

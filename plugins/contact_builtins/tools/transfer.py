@@ -38,7 +38,7 @@ class Transfer(HasSettings):
     hint: ClassVar[str] = (
         "press at the root, drag along the axis; Ctrl takes another patch, Shift mirrors the other way"
     )
-    tree: bool = setting(True, help="what hangs on the patch is copied with it")
+    tree: bool = setting(True, help="the descendants of the patch are copied with it")
     pair: bool = setting(True, help="a copy on another surface is paired with its original at once")
     onward: bool = setting(True, help="after a pair, the next patch there that has none yet is the active one")
     mirrored: Mirrored = setting("auto", help="as the mirror image; auto: on another surface, as contact wants it")

@@ -224,9 +224,7 @@ def test_ctrl_c_leaves_a_report_and_the_code_of_an_interrupt(jobs: Path) -> None
         "--workers",
         "1",
     ]
-    # Shells have what they run in the background ignore SIGINT, and children inherit that.
-    heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
-    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heed)
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=_heed_interrupts)
     deadline = time.monotonic() + 60
     while not list(jobs.glob(f"out/*/{RECEIPT}")) and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -235,6 +233,11 @@ def test_ctrl_c_leaves_a_report_and_the_code_of_an_interrupt(jobs: Path) -> None
     assert running.returncode == 130 and "Traceback" not in said and "interrupted" in said
     counts = json.loads((jobs / "out" / "batch.json").read_text())["counts"]
     assert counts["done"] + counts["same"] >= 1
+
+
+def _heed_interrupts() -> None:
+    """Shells have what they run in the background ignore SIGINT, and children inherit that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_a_job_is_ended_at_its_limit(jobs: Path) -> None:
