@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Macro
 from contact_core.errors import ContactError, InvalidInput
@@ -37,7 +37,7 @@ from contact_core.grasping.hand import Hand
 from contact_core.grasping.metrics import Contact, PosedScene, measure
 from contact_core.grasping.pads import painted_pads
 from contact_core.grasping.screening import distinct, elsewhere, first_look, seen_from
-from contact_core.grasping.slots import KINDS, Approaches, GraspFacts, GraspRequest, Kind
+from contact_core.grasping.slots import KINDS, Approaches, GraspFacts, GraspRequest, GraspScore, Kind
 from contact_core.grasping.verdict import Verdict, judge, judge_hold
 from contact_core.plugins.registry import GRASP_SAMPLERS, GRASP_SCORES, PLACERS, POSE_TERMS
 from contact_core.plugins.slots import PlacementRequest
@@ -302,7 +302,7 @@ def _finished(
     proposed: bool,
     approach: Approaches,
     closed: Closed,
-    score: Any,
+    score: GraspScore,
 ) -> Suggestion | None:
     """A closed hand as a solved document; None where too few pads find a place."""
     hand, draft = scene.hand, base.copy()
@@ -310,10 +310,28 @@ def _finished(
     in_rig = np.linalg.inv(world) @ np.linalg.inv(scene.object_from_world) @ closed.placed[0]
     draft.surfaces.set_pose(scene.hand_name, hand.pose(in_rig, closed.angles[0], closed.starts[0]))
     wanted = _taking_part(scene, approach, pads)
+    return finished(scene, draft, wanted, proposed, approach.kinds[0], approach.limits[0] >= 1.0, score)
+
+
+def finished(
+    scene: GraspScene,
+    draft: RecordingDraft,
+    wanted: tuple[str, ...],
+    proposed: bool,
+    kind: Kind,
+    used: BoolArray,
+    score: GraspScore,
+) -> Suggestion | None:
+    """A hand that a draft has posed, as a solved and judged document; None where fewer than two pads find a place.
+
+    wanted: patches of the hand that shall touch. proposed: whether those that do not may be left out. used: (D,)
+    which digits take part.
+    """
     left_out = _place(scene, draft, wanted)
     if len(wanted) - len(left_out) < 2:
         return None
-    whole = bool(scene.solid.distances(_stands(scene, draft)[1].points).min() > -OUTSIDE * hand.length)
+    deepest = scene.solid.distances(_stands(scene, draft)[1].points).min()
+    whole = bool(deepest > -OUTSIDE * scene.hand.length)
     try:
         solution = _settled(scene, draft, whole)
         if proposed and (bad := _unfit(scene, solution)) and len(draft.document.pairs) - len(bad) >= 2:
@@ -325,7 +343,7 @@ def _finished(
             solution = _settled(scene, draft, whole)
     except InvalidInput:
         return None
-    return _judged(scene, draft, solution, approach, closed, left_out, len(wanted), proposed, score)
+    return judged(scene, draft, solution, kind, used, left_out, len(wanted), proposed, score)
 
 
 def _settled(scene: GraspScene, draft: RecordingDraft, whole: bool) -> PoseSolution:
@@ -408,10 +426,12 @@ def hand_share(scene: GraspScene) -> float:
     return scene.hand.length / manipulator_length(scene.rig)
 
 
-def _judged(
-    scene: GraspScene, draft: RecordingDraft, solution: PoseSolution, approach: Approaches, closed: Closed,
-    left_out: dict[str, str], wanted: int, proposed: bool, score: Any,
+def judged(
+    scene: GraspScene, draft: RecordingDraft, solution: PoseSolution, kind: Kind, used: BoolArray,
+    left_out: dict[str, str], wanted: int, proposed: bool, score: GraspScore,
 ) -> Suggestion:  # fmt: skip
+    """What a draft has made of a document, measured, judged and scored, as one step. As for `finished`; wanted: how
+    many patches of the hand were to touch."""
     hand, rig = scene.hand, scene.rig
     pose = draft.document.poses[scene.hand_name]
     local = _local(rig, pose)
@@ -430,7 +450,6 @@ def _judged(
         )
     )  # fmt: skip
     touching = digits_in_contact(hand, posed.points, Locator.of(scene.mesh))
-    used = approach.limits[0] >= 1.0
     angles = hand.angles_of(pose)
     metrics |= {
         "pads_placed": (wanted - len(left_out)) / max(wanted, 1),
@@ -444,22 +463,20 @@ def _judged(
     verdict = judge(metrics, {} if proposed else left_out, {})
     if proposed:
         verdict = replace(verdict, failures=tuple(f for f in verdict.failures if not f.startswith("patch ")))
-    held = judge_hold(metrics, approach.kinds[0])
+    held = judge_hold(metrics, kind)
     verdict = replace(verdict, failures=verdict.failures + held)
     placed = object_from_rig @ local[rig.parents < 0][0] @ np.linalg.inv(rig.rest_local[rig.parents < 0][0])
     way = placed[:3, :3] @ hand.frame[:, 0]
     facts = GraspFacts(
-        approach.kinds[0], metrics, metrics["closure"], comfort(hand, angles),
+        kind, metrics, metrics["closure"], comfort(hand, angles),
         clearance(hand, scene.field, placed, way), verdict.failures,
     )  # fmt: skip
-    command = Macro(f"{approach.kinds[0].capitalize()} grasp", tuple(draft.commands))
+    command = Macro(f"{kind.capitalize()} grasp", tuple(draft.commands))
     proposal = Proposal(
         command, draft.document, scene.revision, solution, solution, left_out, solutions=(solution,)
     )
     seen = seen_from(hand, scene.field, placed[None])[0]
-    return Suggestion(
-        proposal, approach.kinds[0], facts, verdict, float(score.score(facts)), left_out, posed, placed, way, seen
-    )
+    return Suggestion(proposal, kind, facts, verdict, float(score.score(facts)), left_out, posed, placed, way, seen)
 
 
 def _local(rig: Rig, pose: Pose) -> FloatArray:
