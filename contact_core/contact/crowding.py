@@ -14,6 +14,7 @@ from contact_core.arrays import BoolArray, FloatArray
 MEET = 0.75  # times the spacing of the points: so near they lie on one another there
 APART = 4.0  # times the spacing: so far they are different parts here
 NEIGHBOURS = 8  # there, of each point, that are looked at
+SAMPLED = 100  # points, at least, whose spacing is measured
 
 
 def crowded_points(here: FloatArray, there: FloatArray) -> BoolArray:
@@ -27,10 +28,10 @@ def crowded_points(here: FloatArray, there: FloatArray) -> BoolArray:
     crowded = np.zeros(n, bool)
     if n < 2:
         return crowded
-    nearest = cKDTree(here).query(here, k=2)[0][:, 1]  # (n,)
-    spacing = float(np.median(nearest))
+    spacing = float(np.median(cKDTree(here).query(here[:: max(1, n // SAMPLED)], k=2)[0][:, 1]))
     k = min(NEIGHBOURS, n)
     distance, other = cKDTree(there).query(there, k=k, distance_upper_bound=MEET * spacing)  # (n, k)
-    found = np.isfinite(distance)
-    apart = np.linalg.norm(here[:, None] - here[np.where(found, other, 0)], axis=2)  # (n, k)
-    return np.asarray((found & (apart > APART * spacing)).any(axis=1))
+    point, column = np.nonzero(np.isfinite(distance))
+    apart = np.linalg.norm(here[point] - here[other[point, column]], axis=1)
+    crowded[point[apart > APART * spacing]] = True
+    return crowded

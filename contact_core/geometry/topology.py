@@ -8,10 +8,11 @@ needs to be manifold: what is not is marked BLOCKED, and a query that reaches it
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput, NotManifold
 from contact_core.geometry.elements import (
     BLOCKED,
@@ -92,15 +93,15 @@ class Topology:
         """The arrays in one group, as kernels take them."""
         return Halfedges(self.tail, self.twin, self.shape, self.first, self.angle_sum, self.kind)
 
-    @property
+    @cached_property
     def is_manifold(self) -> bool:
         """Whether no edge and no vertex is blocked."""
         return not ((self.twin == BLOCKED).any() or (self.kind == BLOCKED_VERTEX).any())
 
-    @property
+    @cached_property
     def boundary_halfedges(self) -> IntArray:
         """(b,) halfedges with no face on the other side."""
-        return np.flatnonzero(self.twin == BOUNDARY)
+        return frozen(np.flatnonzero(self.twin == BOUNDARY), np.int64, (None,), "boundary_halfedges")
 
     def scale(self, vertex: int) -> float:
         """Factor from corner angles to angles of the vertex's tangent frame: 2 pi (boundary: pi) / angle sum."""
