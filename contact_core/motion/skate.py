@@ -3,6 +3,7 @@
 Seen from the world a held point moves with the object; seen from the object it must not move at all. The gap of
 each pair is therefore measured in the frame of the bone that carries its object point, and skate is how the gap
 changes from frame to frame. Targets that slide on purpose take the gap along, so only what lags behind them costs.
+A contact that fades in or out is on its way and holds nothing yet: its approach is no slip.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.motion.band import BlockBand
+from contact_core.motion.depth import HELD
 from contact_core.rig.skinning import Track
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.state import PoseState
@@ -68,10 +70,8 @@ class Slip:
 
 
 def held_rows(before: PoseProblem, then: PoseProblem) -> Slip:
-    """The points of the contacts that are on in both problems, paired by name, with as many points in both.
-
-    Weights are shares of all contacts' weights, times the smaller of the two gains.
-    """
+    """The points of the contacts that are fully on in both problems (gain from `HELD`, as the report counts them),
+    paired by name, with as many points in both. Weights are shares of all contacts' weights, times the gain."""
     first, second, weights = [], [], []
     total = sum(float(contact.weights.sum()) for contact in then.contacts)
     known = {contact.name: contact for contact in before.contacts}
@@ -80,7 +80,7 @@ def held_rows(before: PoseProblem, then: PoseProblem) -> Slip:
         if other is None or len(other.weights) != len(contact.weights):
             continue
         gain = min(other.gain, contact.gain)
-        if gain > 0.0 and total > 0.0:
+        if gain >= HELD and total > 0.0:
             ends = before.pairs.rows[contact.name], then.pairs.rows[contact.name]
             first.append(np.arange(ends[0].start, ends[0].stop))
             second.append(np.arange(ends[1].start, ends[1].stop))

@@ -15,6 +15,7 @@ from contact_core.errors import Cancelled, InvalidInput
 from contact_core.motion.band import BlockBand, bounded_minimum
 from contact_core.motion.joint import JointObjective
 from contact_core.motion.problem import MotionBounds, MotionProblem, MotionWeights
+from contact_core.motion.skate import held_rows
 from contact_core.motion.solving import MotionOptions, MotionSolution, solve_motion
 from contact_core.progress import CallbackProgress
 from contact_core.rig.rig import Pose
@@ -235,6 +236,27 @@ def test_held_contacts_skate_less_with_the_skate_energy() -> None:
         return np.asarray(placed)
 
     assert skate(10.0) < 0.5 * skate(1e-6)
+
+
+def test_an_approach_is_no_slip() -> None:
+    """A contact that fades in pulls from afar; what it still has to travel must not hold back what holds."""
+    ramp = molded(0.5, gain=lambda share: min(4.0 * share, 1.0))
+    on = [all(contact.gain == 1.0 for contact in problem.contacts) for problem in ramp.problems]
+    for first, second, held in zip(ramp.problems, ramp.problems[1:], held_between(on), strict=False):
+        assert bool(len(held_rows(first, second).weights)) is held
+    motion = replace(ramp, weights=MotionWeights(skate=1.0))
+    thetas = np.array([problem.start_state.theta for problem in motion.problems])
+    thetas[: on.index(True)] += 0.3  # somewhere else on its way
+    objective = JointObjective(motion)
+    moved = objective.parts(objective.states(thetas))["skate"]
+    thetas[: on.index(True)] -= 0.3
+    assert moved == pytest.approx(objective.parts(objective.states(thetas))["skate"])
+    assert moved > 0.0
+
+
+def held_between(on: list[bool]) -> list[bool]:
+    """Whether the contacts are on at both of two frames that follow one another."""
+    return [a and b for a, b in itertools.pairwise(on)]
 
 
 def test_bounds_are_honoured_and_reported() -> None:
