@@ -37,6 +37,7 @@ class Motion:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.atomic_file import write_atomic
+        from contact_core.job.clip import write_clip
         from contact_core.job.film import figures_of, write_movie, write_strip
         from contact_core.opening import open as open_scene
 
@@ -49,9 +50,10 @@ class Motion:
             figures = figures_of(found)
             session.accept(found)
             out.mkdir(parents=True, exist_ok=True)
-            files = {"scene": out / _keyed_name(arguments.scene), "report": out / "motion.json"}
+            files: dict[str, Path] = {"scene": out / _keyed_name(arguments.scene), "report": out / "motion.json"}
             session.save(files["scene"])
             write_atomic(files["report"], json.dumps(figures, indent=1, allow_nan=False) + "\n")
+            files["clip"] = write_clip(session, frames, out / "film.glb")
             if not arguments.no_pictures:
                 files["strip"] = write_strip(session, frames, out / "strip.png")
                 files["movie"] = write_movie(session, frames, out / "film.gif", progress=progress)

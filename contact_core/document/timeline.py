@@ -12,7 +12,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,10 +24,14 @@ from contact_core.geometry.transform import is_rigid
 from contact_core.motion.placement_keys import INTERPOLATIONS, Interpolation, PlacementKey, PlacementKeys
 from contact_core.rig.rig import Pose
 
+if TYPE_CHECKING:
+    from contact_core.rig.pose_keys import PoseKeys
+
 TrackKind = Literal["placement", "pose", "place", "weight"]
 FILM = "film"  # the one timeline that a document has
 MOST_FRAMES = 1_000_000  # of a film: eleven hours at 24 frames a second
 LARGEST_FRAME = 1e9  # beyond it the parts of a frame are lost to rounding, and then whole frames
+CAPTURED = "clip"  # where a key comes from that was captured or animated elsewhere
 SURFACE = ("surface",)  # the one "joint" of an object that is placed
 
 
@@ -139,8 +143,8 @@ class PoseKey:
     """The pose of a rig at a frame.
 
     speeds: (j, 6) of the joints that the pose names, as in `rig.pose_keys.PoseKeys`; None: as the keys beside it
-    suggest. source: of a solved key the digest of what it was solved from (`staleness.motion_source`), empty for
-    one that a person made: that one is a pin, and no solve moves it.
+    suggest. source: of a solved key the digest of what it was solved from (`staleness.motion_source`), CAPTURED for
+    one that came with a clip, empty for one that a person made: that one is a pin, and no solve moves it.
     """
 
     json_union: ClassVar[bool] = True
@@ -282,6 +286,16 @@ def _pose_at(keys: tuple[PoseKey, ...], frame: float) -> Pose:
     local = np.array([key.pose.local for key in two])
     curves = PoseCurves.joined([key.frame for key in two], local, speeds)
     return Pose(first.pose.joints, curves.sampled([frame])[0])
+
+
+def cubic_keys(rig: str, keys: tuple[PoseKey, ...]) -> PoseKeys | None:
+    """Keys that smooth curves join, with the speeds of each; None where any two are joined otherwise."""
+    from contact_core.rig.pose_keys import PoseKeys
+
+    if any(key.interpolation != "smooth" for key in keys[:-1]):
+        return None
+    speeds = tuple(_speeds(keys, at) for at in range(len(keys)))
+    return PoseKeys(rig, tuple(key.frame for key in keys), tuple(key.pose for key in keys), speeds)
 
 
 def _speeds(keys: tuple[PoseKey, ...], at: int) -> FloatArray:

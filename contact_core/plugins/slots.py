@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # so that `contact --help`, which asks for sub-commands, load
     from contact_core.geometry.surface_point import SurfacePoints
     from contact_core.plugins.manager import PluginManager
     from contact_core.progress import Progress
+    from contact_core.rig.clip import Clip
     from contact_core.rig.rig import Pose, Rig
     from contact_core.scene.picture import Picture
 
@@ -42,6 +43,20 @@ class Format(Protocol):
 
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
         """Write assets, rigs posed by name where given; whole or not at all. Raises FileRefused."""
+        ...
+
+
+@runtime_checkable
+class ClipFormat(Format, Protocol):
+    """A format that keeps animations, too. What a format inherits or offers beside `Format`, no hook of its own."""
+
+    def read_clips(self, path: Path, *, sidecar: Path | None = None, rate: float | None = None) -> tuple[Clip, ...]:
+        """The animations in a file, none where there are none. rate: frames per second; None: what the file says,
+        else 24. Raises FileRefused."""
+        ...
+
+    def write_clip(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose], clip: Clip | None) -> None:
+        """As `write`, with an animation: keys by the names of assets. Raises FileRefused, InvalidInput."""
         ...
 
 

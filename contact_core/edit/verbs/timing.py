@@ -13,6 +13,7 @@ from contact_core.contact.placement import Link, Placement, Root
 from contact_core.document.document import ContactDocument, named
 from contact_core.document.staleness import motion_source
 from contact_core.document.timeline import (
+    CAPTURED,
     Key,
     PlaceKey,
     PoseKey,
@@ -41,6 +42,7 @@ from contact_core.edit.commands import (
 from contact_core.edit.derived import Derived
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.motion.placement_keys import Interpolation, PlacementKey, PlacementKeys
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose, Rig
 
 EASE = 0.4  # seconds over which a contact fades in and out by default
@@ -119,7 +121,9 @@ class Film:
             return ()
         document, keys = self.document, track.of(PoseKey)
         return tuple(
-            key.frame for key in keys if not key.is_authored and key.source != motion_source(document, key.frame)
+            key.frame
+            for key in keys
+            if key.source not in ("", CAPTURED) and key.source != motion_source(document, key.frame)
         )
 
     # --- the film -----------------------------------------------------------------------------------------------
@@ -172,6 +176,28 @@ class Film:
         self._editor.do(
             SetKeys(address(kind, name), self._keys(self.document, kind, name, value, at, interpolation))
         )
+
+    def take(self, surface: str, clip: PoseKeys) -> None:
+        """The keys of a clip as pose keys of a surface, in place of what is keyed between its first and its last.
+
+        They are no pins: solving with the weight `follow` keeps to them and mends their contacts. Joints that the
+        rig does not have are refused, those that the clip does not name rest.
+        """
+        rig = named(self._editor.rigs, surface, "rig")
+        track = self.track("pose", surface)
+        keys = []
+        for row, (frame, pose) in enumerate(zip(clip.frames, clip.poses, strict=True)):
+            whole = _completed(pose, surface, frame, None, rig)
+            speeds = None
+            if clip.is_cubic:
+                speeds = np.zeros((len(whole.joints), 6))
+                speeds[[whole.joints.index(joint) for joint in pose.joints]] = clip.speeds[row]
+            keys.append(PoseKey(frame, whole, speeds, "smooth" if clip.is_cubic else "linear", CAPTURED))
+        if not keys:
+            raise InvalidInput("the clip has no keys.")
+        there = track.frames if track is not None else ()
+        gone = tuple(frame for frame in there if keys[0].frame <= frame <= keys[-1].frame)
+        self._editor.do(SetKeys(address("pose", surface), tuple(keys), gone, "Take a clip as"))
 
     def remove_key(self, kind: TrackKind, name: str, frame: float | None = None) -> None:
         """Take out the key at a frame, the one shown by default. Without its last key a track ends."""

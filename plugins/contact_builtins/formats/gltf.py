@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,12 +12,14 @@ from contact_builtins.formats.gltf_container import open_gltf
 from contact_builtins.formats.gltf_nodes import read_nodes
 from contact_builtins.formats.gltf_rig import rig_asset
 from contact_builtins.formats.gltf_scene import Part, read_parts
+from contact_builtins.formats.gltf_skeleton import read_skeleton
 from contact_builtins.formats.polygons import Polygons, surface_of
 from contact_builtins.formats.refusal import refusing
 from contact_builtins.formats.sidecar import read_sidecar, sidecar_beside
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.rig.clip import Clip
 from contact_core.rig.rig import Pose
 
 
@@ -45,8 +48,32 @@ class GltfFiles:
                 raise FileRefused(f"{path} holds no skin, so the rig sidecar {sidecar} has no joints to describe.")
             return _object_asset(path, parts, notes)
 
+    def read_clips(self, path: Path, *, sidecar: Path | None = None, rate: float | None = None) -> tuple[Clip, ...]:
+        """The animations of the rig in a file, none for a file without a skin. Raises FileRefused."""
+        from contact_builtins.formats.gltf_clips import read_clips
+
+        path = Path(path)
+        if rate is not None and not 0.0 < rate < math.inf:
+            raise InvalidInput(f"the rate is a positive number of frames per second, but got {rate}.")
+        with refusing(path, "a glTF 2.0 file"):
+            told = sidecar or sidecar_beside(path)
+            gltf = open_gltf(path)
+            nodes = read_nodes(gltf)
+            parts, notes = read_parts(gltf, nodes)
+            skins = sorted({part.skin for part in parts if part.skin is not None})
+            if not skins:
+                return ()
+            words = read_sidecar(told) if told else None
+            rig = rig_asset(gltf, nodes, parts, words, notes).rig
+            assert rig is not None
+            return read_clips(gltf, nodes, read_skeleton(gltf, nodes, skins, words), rig, rate)
+
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
         """One GLB with every asset; rigs as skins in their pose. Raises FileRefused, InvalidInput."""
+        self.write_clip(path, assets, poses, None)
+
+    def write_clip(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose], clip: Clip | None) -> None:
+        """One GLB with every asset and, where a clip is given, its animation. Raises FileRefused, InvalidInput."""
         from contact_builtins.formats.gltf_writer import glb_bytes
         from contact_core.atomic_file import write_atomic
 
@@ -54,7 +81,7 @@ class GltfFiles:
             raise FileRefused(f"{path}: glTF is written as one binary file; let its name end in .glb.")
         if not Path(path).absolute().parent.is_dir():
             raise FileRefused(f"{path} cannot be written: there is no folder {Path(path).parent}. Make it first.")
-        write_atomic(path, glb_bytes(assets, poses))
+        write_atomic(path, glb_bytes(assets, poses, clip))
 
 
 def _object_asset(path: Path, parts: list[Part], notes: list[str]) -> Asset:

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from contact_builtins.formats.gltf_animation import add_animation
 from contact_builtins.formats.gltf_container import BINARY_CHUNK, JSON_CHUNK, MAGIC
 from contact_core._version import __version__
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
+from contact_core.rig.clip import Clip
 from contact_core.rig.rig import Pose, Rig
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -30,7 +32,7 @@ Y_FROM_UP = {
 
 
 @dataclass
-class _Scene:
+class GlbScene:
     """A glTF document under construction."""
 
     nodes: list[dict[str, Any]] = field(default_factory=list)
@@ -38,6 +40,7 @@ class _Scene:
     skins: list[dict[str, Any]] = field(default_factory=list)
     accessors: list[dict[str, Any]] = field(default_factory=list)
     views: list[dict[str, Any]] = field(default_factory=list)
+    animations: list[dict[str, Any]] = field(default_factory=list)
     roots: list[int] = field(default_factory=list)
     binary: bytearray = field(default_factory=bytearray)
 
@@ -65,26 +68,31 @@ class _Scene:
         return len(self.nodes) - 1
 
 
-def glb_bytes(assets: Sequence[Asset], poses: Mapping[str, Pose]) -> bytes:
+def glb_bytes(assets: Sequence[Asset], poses: Mapping[str, Pose], clip: Clip | None = None) -> bytes:
     """The bytes of a GLB. A rig takes the pose under its asset's name, else rests; an asset without a rig is
-    moved by a pose of one joint, its world transform. Raises InvalidInput on poses that fit nothing."""
+    moved by a pose of one joint, its world transform. clip: its one animation, by the names of assets. Raises
+    InvalidInput on poses and keys that fit nothing."""
     unknown = sorted(set(poses) - {asset.name for asset in assets})
     if unknown:
         raise InvalidInput(
             f"there is a pose for {unknown[0]!r}, but no such asset; assets: {[a.name for a in assets]}."
         )
-    scene = _Scene()
+    scene = GlbScene()
+    nodes: dict[str, list[int | None]] = {}
     for asset in assets:
         holder = scene.node(name=asset.name, children=[], matrix=_columns(_to_gltf(asset)))
         scene.roots.append(holder)
         if asset.rig is not None:
-            _add_rig(scene, holder, asset.rig, poses.get(asset.name, Pose.rest(asset.rig)))
+            nodes[asset.name] = _add_rig(scene, holder, asset.rig, poses.get(asset.name, Pose.rest(asset.rig)))
         else:
-            _add_object(scene, holder, asset, poses.get(asset.name))
+            nodes[asset.name] = [_add_object(scene, holder, asset, poses.get(asset.name))]
+    if clip is not None:
+        add_animation(scene, clip, assets, nodes)
     return _container(scene)
 
 
-def _add_object(scene: _Scene, holder: int, asset: Asset, pose: Pose | None) -> None:
+def _add_object(scene: GlbScene, holder: int, asset: Asset, pose: Pose | None) -> int | None:
+    """The node that stands for it, None where it takes two."""
     if pose is not None and len(pose.joints) != 1:
         raise InvalidInput(f"{asset.name!r} has no rig: its pose is one transform, but got {len(pose.joints)}.")
     mesh = _add_mesh(scene, asset.name, asset.mesh.points, asset.mesh.faces, asset.mesh.vertex_normals, {})
@@ -94,9 +102,11 @@ def _add_object(scene: _Scene, holder: int, asset: Asset, pose: Pose | None) -> 
     if outer is not None:
         child = scene.node(name=f"{asset.name} stretch", children=[child], **outer)
     scene.nodes[holder]["children"].append(child)
+    return None if outer is not None else child
 
 
-def _add_rig(scene: _Scene, holder: int, rig: Rig, pose: Pose) -> None:
+def _add_rig(scene: GlbScene, holder: int, rig: Rig, pose: Pose) -> list[int | None]:
+    """The node of each joint, None where it takes two."""
     local = rig.rest_local.copy()
     for name, matrix in zip(pose.joints, pose.local, strict=True):
         local[rig.joint_index(name)] = matrix
@@ -118,6 +128,7 @@ def _add_rig(scene: _Scene, holder: int, rig: Rig, pose: Pose) -> None:
     scene.nodes[holder]["children"].append(
         scene.node(name=f"{rig.name} skin", mesh=mesh, skin=len(scene.skins) - 1)
     )
+    return [joint if outer is None else None for joint, (outer, _) in zip(joints, split, strict=True)]
 
 
 def _influences(rig: Rig) -> dict[str, npt.NDArray[Any]]:
@@ -135,7 +146,12 @@ def _influences(rig: Rig) -> dict[str, npt.NDArray[Any]]:
 
 
 def _add_mesh(
-    scene: _Scene, name: str, points: FloatArray, faces: Any, normals: FloatArray, more: dict[str, npt.NDArray[Any]]
+    scene: GlbScene,
+    name: str,
+    points: FloatArray,
+    faces: Any,
+    normals: FloatArray,
+    more: dict[str, npt.NDArray[Any]],
 ) -> int:
     filled = np.where(np.abs(normals).sum(axis=1, keepdims=True) > 0, normals, [0.0, 0.0, 1.0])
     attributes = {
@@ -202,7 +218,7 @@ def _columns(matrix: FloatArray) -> list[float]:
     return [float(value) for value in matrix.T.ravel()]
 
 
-def _container(scene: _Scene) -> bytes:
+def _container(scene: GlbScene) -> bytes:
     document = {
         "asset": {"version": "2.0", "generator": f"contact-core {__version__}"},
         "scene": 0,
@@ -210,6 +226,7 @@ def _container(scene: _Scene) -> bytes:
         "nodes": [_without_empty(node) for node in scene.nodes],
         "meshes": scene.meshes,
         "skins": scene.skins,
+        "animations": scene.animations,
         "accessors": scene.accessors,
         "bufferViews": scene.views,
         "buffers": [{"byteLength": len(scene.binary)}],
