@@ -54,7 +54,8 @@ class KeepOutTerm(PenetrationTerm):
 @dataclass(frozen=True, eq=False)
 class KeepOutOfHollowsTerm(PenetrationTerm):
     """Penetration with hollows filled, so that no finger is drawn through a thin wall. Where a contact lies in a
-    hollow of an object (in a cup, through its handle) the hand is to reach into it, and nothing there is filled."""
+    hollow of an object (in a cup, through its handle) the hand is to reach into it, and nothing there is filled.
+    While a contact is dragged (`PoseProblem.continued`) what is filled stays so."""
 
     summary: ClassVar[str] = "skin stays out of what is solid, and of hollows without a contact"
     default_for: ClassVar[str] = ""

@@ -33,7 +33,7 @@ class Desk:
     view: of the event that is handled. ghost: a proposal's document, which is shown in place of the session's.
     pins: terms that pull on hands while a gesture lasts: the pose that follows is the edit. Such a term names its
     `bodies`. held: joints that do not follow meanwhile. settled: whether the gesture itself has posed the
-    hand, so that no solve follows it.
+    hand, so that no solve follows it. remark: what is worth knowing of what a gesture did, for the line of status.
     """
 
     def __init__(self, session: Session, view: View, *, meters_per_unit: float = 1.0) -> None:
@@ -45,6 +45,7 @@ class Desk:
         self.pins: tuple[PoseTerm, ...] = ()
         self.held: tuple[str, ...] = ()
         self.settled = False
+        self.remark = ""
         self._stack: contextlib.ExitStack | None = None
         self._stroke: Stroke | None = None
         self._given: dict[tuple[str, str], dict[str, Any]] = {}

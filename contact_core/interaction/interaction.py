@@ -10,8 +10,8 @@ if interaction.advance():            # once a frame, before drawing: the live so
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from contact_core.errors import ContactError, InvalidInput
 from contact_core.interaction.actions import Action, action_of, actions_of
@@ -22,54 +22,18 @@ from contact_core.interaction.events import Event, Key, Pointer
 from contact_core.interaction.live import LiveSolve, prepare
 from contact_core.interaction.overlay import NOTHING, Overlay
 from contact_core.interaction.proposing import Proposing
+from contact_core.interaction.radius import RadiusGesture
 from contact_core.interaction.settings import InteractionSettings, Selection
+from contact_core.interaction.status import Changes, Part, Status
 from contact_core.interaction.tool import Gesture, Tool
 from contact_core.interaction.view import Perspective, View
-from contact_core.interaction.work import Worker, WorkStatus
+from contact_core.interaction.work import Worker
 from contact_core.plugins.registry import TOOLS, Slot
 from contact_core.settings import configured
 
 if TYPE_CHECKING:
     from contact_core.edit.listeners import DocumentChanged
     from contact_core.session import Session
-
-Part: TypeAlias = Literal["document", "overlay", "selection", "tool", "settings", "status", "work", "visibility"]
-
-
-@dataclass(frozen=True)
-class Changes:
-    """What changed since the last call. surfaces: those whose points or places moved, or that came or went. parts:
-    what else a front end may show."""
-
-    surfaces: frozenset[str] = frozenset()
-    parts: frozenset[Part] = frozenset()
-
-    def __bool__(self) -> bool:
-        return bool(self.surfaces or self.parts)
-
-
-@dataclass(frozen=True)
-class Status:
-    """The line of status. refusal: the last sentence that something was refused with, until the next event that
-    works. solve_ms: of the last live solve. step: what undo would take back."""
-
-    tool: str
-    hint: str
-    surface: str | None
-    refusal: str
-    solve_ms: float | None
-    work: WorkStatus | None
-    proposed: str
-
-    def line(self) -> str:
-        """All of it as one line of text."""
-        parts = [self.tool, f"on {self.surface}" if self.surface else "", self.hint, self.proposed]
-        if self.work is not None:
-            share = "" if self.work.fraction is None else f" {100 * self.work.fraction:.0f} %"
-            parts.append(f"{self.work.title}{share} {self.work.text}".strip())
-        if self.solve_ms is not None:
-            parts.append(f"solve {self.solve_ms:.0f} ms")
-        return " · ".join(part for part in [*parts, self.refusal] if part)
 
 
 class Interaction:
@@ -245,7 +209,7 @@ class Interaction:
         if event.button != "left" or not self._tool:
             self._camera_has.add(event.button)
             return False
-        self._refusal = ""
+        self._refusal = self.desk.remark = ""
         selection = self.desk.selection
         try:
             gesture = self.desk.tool(self._tool).press(self.desk, event)
@@ -326,7 +290,7 @@ class Interaction:
         found = next((each for each in self.actions if each.id == action and not each.by_host), None)
         if found is None:
             raise InvalidInput(f"the interaction has no action {action!r}; see `Interaction.actions`.")
-        self._refusal = ""
+        self._refusal = self.desk.remark = ""
         if found.group == "tool":
             self.take_up(action.removeprefix("tool."))
         elif action == "edit.cancel":
@@ -402,7 +366,7 @@ class Interaction:
             hint = self._gesture.hint() or hint
         solve_ms = self._live.milliseconds if self._live is not None and self._live.solves else None
         return Status(self._tool, hint, self.selection.surface, self._refusal, solve_ms, self.worker.status,
-                      self.proposing.summary)  # fmt: skip
+                      self.proposing.summary, self.desk.remark)  # fmt: skip
 
     # -- inside ----------------------------------------------------------------------------------------------
 
@@ -433,25 +397,3 @@ class Interaction:
 
     def _touch(self, *parts: Part) -> None:
         self._parts.update(parts)
-
-
-class RadiusGesture(Gesture):
-    """The radius of the brush by moving the pointer, without a button: twice as large every 120 pixels."""
-
-    def __init__(self, interaction: Interaction) -> None:
-        self._interaction = interaction
-        self._before = getattr(interaction.desk.tool(interaction.tool), "radius", None)
-        self._start: Pointer | None = None
-        interaction.resize(1.0)  # refuses a tool that has no radius
-
-    def move(self, pointer: Pointer) -> None:
-        self._start = self._start or pointer
-        doublings = (pointer.x - self._start.x) / (120.0 * self._interaction.desk.view.pixel_ratio)
-        self.cancel()
-        self._interaction.resize(2.0 ** min(max(doublings, -6.0), 6.0))
-
-    def cancel(self) -> None:
-        self._interaction.configure(TOOLS, self._interaction.tool, radius=self._before)
-
-    def hint(self) -> str:
-        return "move to set the radius, click to keep it"

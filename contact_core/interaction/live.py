@@ -15,6 +15,7 @@ from contact_core.edit.commands import SetPose
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
+from contact_core.grasping.filled import KeepOutOfHollowsTerm
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
 from contact_core.progress import Progress
 from contact_core.rig.rig import Pose
@@ -71,9 +72,14 @@ class LiveSolve:
         return desk.command is not self._done or not self._settled
 
     def finish(self) -> None:
-        """Follow until the pose has settled, or for as many iterations as a solve beside the window may make."""
+        """Follow until the pose has settled, or for as many iterations as a solve beside the window may make.
+
+        The problem is made anew for it: what a term keeps while contacts are dragged (which hollows are filled) is
+        then as a solve after the gesture has it.
+        """
         self._to_the_end = True
-        self._settled = self._settled and self._converged
+        self._settled = self._settled and self._converged and not self.solves
+        self._warm = None
         for _ in range(_STEPS_AT_RELEASE):
             if not self.follow():
                 return
@@ -180,13 +186,9 @@ class LiveSolve:
         return self._start if kind == "start" else kind
 
     def _terms(self, problem: PoseProblem) -> tuple[PoseTerm, ...]:
-        settings, plugins = self._desk.settings, self._desk.session.plugins
-        terms = paper_terms(prior=settings.prior_weight) + self._desk.pins
+        terms = paper_terms(prior=self._desk.settings.prior_weight) + self._desk.pins
         rigid = any(len(body.rig.joints) == 1 and body.black_box is None for body in problem.bodies)
-        if settings.penetration and settings.penetration_weight > 0.0 and rigid and plugins.offers(POSE_TERMS):
-            name = plugins.name_for(POSE_TERMS, "depth")
-            terms += (plugins.make(POSE_TERMS, name, weight=settings.penetration_weight),)
-        return terms
+        return terms + (depth_terms(self._desk) if rigid else ())
 
     def _held(self, problem: PoseProblem) -> dict[str, tuple[str, ...]]:
         """The joints that are held, by the bodies that have them."""
@@ -252,6 +254,18 @@ def prepare(surfaces: Sequence[tuple[TriangleMesh, bool]], progress: Progress) -
         with contextlib.suppress(InvalidInput):
             if not bends:
                 DistanceField.of(mesh, resolution=RESOLUTION)
+
+
+def depth_terms(desk: Desk) -> tuple[PoseTerm, ...]:
+    """The term that keeps skin out of what is solid, as the settings want it: the same while a hand follows as in
+    the solve after it, or the one would lead to poses that the other does not find out of again (a thumb drawn
+    through a cup's thin wall)."""
+    settings, plugins = desk.settings, desk.session.plugins
+    if not settings.penetration or settings.penetration_weight == 0.0 or not plugins.offers(POSE_TERMS):
+        return ()
+    if settings.hollows:
+        return (KeepOutOfHollowsTerm(weight=settings.penetration_weight),)
+    return (plugins.make(POSE_TERMS, plugins.name_for(POSE_TERMS, "depth"), weight=settings.penetration_weight),)
 
 
 def _bodies(pins: tuple[Any, ...]) -> tuple[str, ...]:

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected
-from contact_core.grasping.filled import KeepOutOfHollowsTerm
+from contact_core.interaction.live import depth_terms
 from contact_core.interaction.overlay import Ghost, Overlay
 from contact_core.interaction.work import Worker
-from contact_core.plugins.registry import GRASP_SAMPLERS, POSE_TERMS
+from contact_core.plugins.registry import GRASP_SAMPLERS
 from contact_core.progress import Progress
 from contact_core.proposals.draft import Draft
 from contact_core.scene.problem import Objective
-from contact_core.solve.terms import PoseTerm, paper_terms
+from contact_core.solve.terms import paper_terms
 
 if TYPE_CHECKING:
     from contact_core.grasping.suggest import Suggestion
@@ -137,9 +137,7 @@ class Proposing:
         if not session.document.pairs:
             raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
         self.dismiss()
-        terms = paper_terms(prior=settings.prior_weight)
-        if settings.penetration and settings.penetration_weight > 0.0 and session.plugins.offers(POSE_TERMS):
-            terms += (self._depth(),)
+        terms = paper_terms(prior=settings.prior_weight) + depth_terms(self._desk)
         poses = dict(session.document.poses)
         objective = Objective(terms) if settings.prior == "rest" else Objective(terms, prior=poses)
         start, derived, rigs = session.document, session.derived.apart(), dict(session.rigs)
@@ -151,14 +149,6 @@ class Proposing:
             return find(start, draft, SolveSettings(solver, objective=objective, progress=progress))
 
         self._worker.begin(title, work, self.show)
-
-    def _depth(self) -> PoseTerm:
-        settings, plugins = self._desk.settings, self._desk.session.plugins
-        if settings.hollows:
-            return KeepOutOfHollowsTerm(weight=settings.penetration_weight)
-        name = plugins.name_for(POSE_TERMS, "depth")
-        term: PoseTerm = plugins.make(POSE_TERMS, name, weight=settings.penetration_weight)
-        return term
 
     def show(self, proposal: Proposal) -> None:
         """Show a proposal in place of the document, until it is accepted or dismissed.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -21,6 +21,14 @@ from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution
 
 
+class _QuietPatches(Patches):
+    """Verbs whose results are looked at and mostly thrown away, again with each move of a pointer: the log keeps
+    quiet."""
+
+    def _warn_where_crowded(self, copies: Iterable[str]) -> None:
+        pass
+
+
 class Draft:
     """An editor of a document of its own. rigs: by surface. evaluated: those whose skin only the host evaluates."""
 
@@ -36,7 +44,7 @@ class Draft:
         self.rigs, self.evaluated = dict(rigs), dict(evaluated or {})
         self.makers = makers or Makers()
         self.geometry = DocumentGeometry(lambda: self._document, derived, self.rigs)
-        self.patches, self.pairs, self.surfaces = Patches(self), Pairs(self), Surfaces(self)
+        self.patches, self.pairs, self.surfaces = _QuietPatches(self), Pairs(self), Surfaces(self)
 
     @property
     def document(self) -> ContactDocument:

@@ -351,7 +351,8 @@ class Application:
         status = self.interaction.status
         where = f"on {status.surface}" if status.surface else ""
         solved = "" if status.solve_ms is None else f"solve {status.solve_ms:.0f} ms"
-        return " · ".join(part for part in (status.hint, where, status.proposed, solved, *self.notes) if part)
+        told = (status.hint, where, status.proposed, solved, status.remark, *self.notes)
+        return " · ".join(part for part in told if part)
 
     def tree(self) -> list[dict[str, Any]]:
         """The rows of the tree."""

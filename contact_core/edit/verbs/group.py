@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Self, TypeVar
 
@@ -29,6 +29,13 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 CROWDED = 0.02  # share of a copy's points: fewer may meet at a seam
 _CURE = "Transfer them part by part, to places of their own, or scale them down."
+
+
+def crowding(found: Mapping[str, float]) -> str:
+    """A sentence on parts that lie on one another; "" where none do. found: as `DocumentGeometry.crowded` finds."""
+    shares = {name: share for name, share in found.items() if share > CROWDED}
+    told = ", ".join(f"{name!r} ({100.0 * share:.0f} % of its points)" for name, share in shares.items())
+    return f"parts that were apart lie on one another now: {told}. {_CURE}" if told else ""
 
 
 class VerbGroup:
@@ -98,16 +105,14 @@ class VerbGroup:
 
     def _warn_where_crowded(self, copies: Iterable[str]) -> None:
         """Say in the log where parts of what was transferred lie on one another. A stroke previews from its start,
-        where the copies are not, so a drag is not commented on frame by frame."""
+        where the copies are not, and drafts keep quiet, so a drag is not commented on frame by frame."""
         there = [name for name in copies if name in self._document.patches]
         try:
             found = self._geometry.crowded(there)
         except InvalidInput:  # it is committed: what cannot be looked at is not commented on
             return
-        shares = {name: share for name, share in found.items() if share > CROWDED}
-        if shares:
-            told = ", ".join(f"{name!r} ({100.0 * share:.0f} % of its points)" for name, share in shares.items())
-            log.warning("parts that were apart lie on one another now: %s. %s", told, _CURE)
+        if told := crowding(found):
+            log.warning("%s", told)
 
     def _check_axis_point(self, patch: str, point: int) -> None:
         """A patch has this axis point. Raises InvalidInput."""

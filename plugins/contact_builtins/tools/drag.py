@@ -10,7 +10,7 @@ from contact_core.errors import ContactError
 from contact_core.interaction.desk import Desk
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import NOTHING, Handle, Overlay
-from contact_core.interaction.seen import Hit
+from contact_core.interaction.seen import Hit, SeenSurface
 from contact_core.interaction.tool import Gesture
 
 
@@ -61,8 +61,8 @@ def patch_under(desk: Desk, pointer: Pointer) -> tuple[str, Hit] | None:
 
 
 def root_handle(desk: Desk, patch: str) -> Handle | None:
-    """The handle at the root of a patch; None where its surface is not loaded."""
-    seen = desk.scene.surfaces.get(desk.document.patch(patch).surface)
+    """The handle at the root of a patch; None where its surface is not worked on."""
+    seen = _worked_on(desk, patch)
     if seen is None:
         return None
     return Handle("root", "root", seen.positions(desk.shown.axis_points(patch))[0])
@@ -70,8 +70,8 @@ def root_handle(desk: Desk, patch: str) -> Handle | None:
 
 def axis_handles(desk: Desk, patch: str) -> tuple[tuple[int, Handle], ...]:
     """Handles on the axis of a patch with the axis points where they are: root, end, and interior points that stay
-    `handle_gap` pixels apart on the screen."""
-    seen = desk.scene.surfaces.get(desk.document.patch(patch).surface)
+    `handle_gap` pixels apart on the screen. None where its surface is not worked on."""
+    seen = _worked_on(desk, patch)
     if seen is None:
         return ()
     at = seen.positions(desk.shown.axis_points(patch))  # (m, 3)
@@ -86,6 +86,13 @@ def axis_handles(desk: Desk, patch: str) -> tuple[tuple[int, Handle], ...]:
     handles = [(0, Handle("root", "root", at[0]))]
     handles += [(point, Handle(f"bend {point}", "bend", at[point], radius=6.0)) for point in chosen[1:]]
     return (*handles, (last, Handle("end", "end", at[last], radius=5.0))) if last else tuple(handles)
+
+
+def _worked_on(desk: Desk, patch: str) -> SeenSurface | None:
+    """The surface of a patch; None where it is not loaded, or where tools work on another. A patch and what it
+    meets lie in one place, so a handle of the one would take presses that are meant for the other."""
+    name = desk.document.patch(patch).surface
+    return desk.scene.surfaces.get(name) if desk.selection.surface in (None, name) else None
 
 
 def shown_handles(desk: Desk) -> Overlay:

@@ -13,6 +13,7 @@ from contact_builtins.tools.move import as_seen, heading_to
 from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Root
 from contact_core.document.document import ContactDocument
+from contact_core.edit.verbs.group import crowding
 from contact_core.errors import ContactError, NotManifold
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import heading_to_direction
@@ -80,7 +81,7 @@ class Transferring(Drag):
         super().__init__(desk, pointer)
         self.tool, self.source, self.root = tool, source, hit
         self.default = _along(desk, source, hit)
-        self.copy, self.selected = source, desk.selection
+        self.copy, self.copies, self.selected = source, tuple[str, ...](), desk.selection
         self.drag(pointer)
 
     def move(self, pointer: Pointer) -> None:
@@ -88,6 +89,7 @@ class Transferring(Drag):
 
     def release(self, pointer: Pointer) -> None:
         super().release(pointer)
+        self.desk.remark = crowding(self.desk.shown.crowded(self.copies))
         following = _next_unpaired(self.desk.document, self.source) if self.tool.onward else None
         if following is not None:
             self.desk.selection = replace(self.desk.selection, patches=(following,))
@@ -106,7 +108,7 @@ class Transferring(Drag):
             self.source, self.root.surface, self.root.point, descendants=self.tool.tree,
             mirrored=self.tool.is_mirrored(self.desk, self.source, self.root.surface, pointer), **given,
         )  # fmt: skip
-        self.copy = names[self.source]
+        self.copy, self.copies = names[self.source], tuple(names.values())
         self.desk.preview(f"Transfer {self.source}", self._paired(draft, names))
 
     def _toward(self, end: SurfacePoints) -> dict[str, Any]:

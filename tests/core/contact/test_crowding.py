@@ -13,7 +13,10 @@ from scipy.spatial.transform import Rotation
 import contact_core as contact
 from contact_core.contact.crowding import crowded_points
 from contact_core.geometry.raycast import Locator
+from contact_core.interaction.interaction import Interaction
+from contact_core.interaction.view import Perspective
 from contact_core.testing import meshes
+from contact_core.testing.artist import Artist
 
 
 def square(seed: int, centre: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
@@ -70,6 +73,22 @@ def test_a_strip_that_runs_over_its_own_start_is_told_once_committed(
         assert (session.geometry.crowded([copy])[copy] > 0.3) is crowded
         said = [record.getMessage() for record in caplog.records]
         assert bool(said) is crowded and all("lie on one another" in one and copy in one for one in said)
+
+
+def test_an_artist_is_told_in_the_line_when_the_copy_is_let_go(caplog: pytest.LogCaptureFixture) -> None:
+    """Neither hovering nor a drag comments on what it shows; what was made is commented on once."""
+    view = Perspective.looking_at((0.0, 0.0, 2.0), (8.0, 0.0, 2.0), viewport=(800, 600))
+    with painted(5.0) as session, caplog.at_level(logging.WARNING):
+        artist = Artist(session, Interaction(session), view)
+        artist.hands.select("strip", surface="pole")
+        artist.hands.take_up("transfer")
+        start, end = (artist.at(place) for place in ((0.4, 0.0, 2.0), (0.35, 0.2, 2.0)))
+        artist.move(start)
+        artist.drag(start, 0.5 * (start + end), end)
+        assert len(session.document.patches) == 2 and not caplog.records
+        assert artist.hands.status.remark.count("lie on one another") == 1
+        artist.key("Ctrl+Z")
+        assert not artist.hands.status.remark
 
 
 @pytest.mark.parametrize(("direction", "crowded"), [((0.0, 1.0, 0.0), True), ((0.0, 0.0, 1.0), False)])

@@ -382,6 +382,24 @@ def test_every_solver_follows(solver: str) -> None:
 # -- through one another ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("tool", ["move", "bend"])
+def test_a_handle_on_another_surface_takes_no_press(tool: str) -> None:
+    """What touches lies in one place: the root of the hand's patch is where the ball's is pressed."""
+    artist = ball_and_hand()
+    spot = artist.pixel("ball", artist.session.geometry.axis("spot").points)[-1]
+    pad = artist.hands.desk.scene.surfaces["hand"].positions(artist.session.geometry.root("pad").point())[0]
+    there = artist.session.document.surface("hand").world_from_surface.copy()
+    origin, direction = (part[0] for part in artist.view.rays([spot]))
+    there[:3, 3] += origin + 3.0 * direction - pad
+    artist.session.surfaces.place("hand", there)
+    artist.hands.select("pad", surface="ball")
+    artist.hands.take_up(tool)
+    before = artist.session.document
+    artist.drag(spot, spot + by(12.0, -10.0))
+    assert artist.session.document.patch("pad") == before.patch("pad")
+    assert artist.session.document is not before and artist.hands.selection.patch == "spot"
+
+
 def test_contacts_are_reached_through_what_hides_them() -> None:
     artist = ball_and_hand()
     there = artist.session.document.surface("hand").world_from_surface.copy()
