@@ -123,7 +123,7 @@ def compare_models() -> list[Picture]:
     print(f"{'heading':>8s} {'model':22s} {'folds':>7s} {'length x':>9s} {'area x':>8s}  remarks")
     for degrees in (0, 30, 60):
         root = pole_root(pole, np.radians(degrees))
-        ours = reconstruct_patch(pole, patch.shape, root, mirrored=True)
+        ours = reconstruct_patch(pole, patch.shape, root, patch.shape.axis.transformed(mirrored=True))
         print_row(f"{degrees:d} deg", "axis", patch.distortion(pole, ours.points), f"{int(ours.ran_off.sum())} off")
         single = single_point(patch.mesh, patch.points, patch.axis, pole, ours.axis)
         print_row(f"{degrees:d} deg", "single-point log map", patch.distortion(pole, single), "")
@@ -166,7 +166,7 @@ def strain_the_axis() -> list[Picture]:
     reference = Patch.painted(plane, strip, on_plane(plane, np.array([(0.4, 1.0), (1.6, 1.0)])))
     for title, (picks, dense) in axes.items():
         patch = Patch.painted(plane, strip, on_plane(plane, np.array(picks)), dense=dense)
-        placed = reconstruct_patch(ball, patch.shape, root, mirrored=True)
+        placed = reconstruct_patch(ball, patch.shape, root, patch.shape.axis.transformed(mirrored=True))
         found = patch.distortion(ball, placed.points, reference)
         print_row(None, title, found, "")
         if title in PICTURED:
@@ -181,7 +181,7 @@ def strain_the_axis() -> list[Picture]:
         "ring with a gap on a ball: axis inside it": good,
         "  axis across the gap, outside it": Patch.painted(plane, ring, outside),
     }.items():
-        placed = reconstruct_patch(ball, patch.shape, root, mirrored=True)
+        placed = reconstruct_patch(ball, patch.shape, root, patch.shape.axis.transformed(mirrored=True))
         found = good.distortion(ball, placed.points)
         print_row(None, title, found, "")
         middle = placed.points.positions(ball).mean(axis=0)
@@ -192,7 +192,7 @@ def strain_the_axis() -> list[Picture]:
         ("  saddle", saddle, middle_root(saddle)),
         ("  rough ball", meshes.noisy(4, 0.03), Root(2000, (0.3, 0.3, 0.4), 1j)),
     ):
-        placed = reconstruct_patch(target, reference.shape, where, mirrored=True)
+        placed = reconstruct_patch(target, reference.shape, where, reference.shape.axis.transformed(mirrored=True))
         print_row(None, title, reference.distortion(target, placed.points), f"{int(placed.ran_off.sum())} off")
     return pictures
 

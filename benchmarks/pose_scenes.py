@@ -59,7 +59,7 @@ def wrap(along: float = 0.8, rise: float = 0.32, first: int = 5, last: int = 19)
     points = cast(skin, np.concatenate(rows + halves), inner)
     shape = PatchShape(shape_axis, parameterize_patch(skin, axis, points), np.ones(len(points)))
     root = root_near(pole, np.array([0.03, 0.35, 0.0]), np.array([0.0, rise, 1.0]))
-    placed = reconstruct_patch(pole, shape, root, axis_shape=replace(shape.axis, along=along), mirrored=True)
+    placed = reconstruct_patch(pole, shape, root, replace(shape.axis, along=along, mirrored=True))
     local = rig.rest_local.copy()
     local[0] = np.array([[0, 0, 1, 0.3], [0, 1, 0, 0.1], [-1, 0, 0, 0.0], [0, 0, 0, 1]], float) @ local[0]
     return Scene(
@@ -83,7 +83,7 @@ def transferred(
     """Points of a patch with an axis through `picks`, carried onto a target, as `points` in order."""
     shape, axis = draw_axis(skin, picks)
     patch = PatchShape(shape, parameterize_patch(skin, axis, points), np.ones(len(points)))
-    return reconstruct_patch(target, patch, root, mirrored=True).points
+    return reconstruct_patch(target, patch, root, shape.transformed(mirrored=True)).points
 
 
 def block(start: FloatArray, end: FloatArray, across: FloatArray, rows: int = 9, columns: int = 5) -> FloatArray:

@@ -97,16 +97,15 @@ def parameterize_axis(mesh: TriangleMesh, points: SurfacePoints, heading: comple
     return shape
 
 
-def reconstruct_axis(
-    mesh: TriangleMesh, shape: AxisShape, root: Root, *, mirrored: bool = False, unit: float = 1.0
-) -> Axis:
-    """The axis of `shape` traced from a root (paper: Algorithm 3). unit: factor on all lengths.
+def reconstruct_axis(mesh: TriangleMesh, shape: AxisShape, root: Root) -> Axis:
+    """The axis of `shape` traced from a root (paper: Algorithm 3). shape: as it lies on that surface
+    (`AxisShape.transformed`).
 
-    mirrored: every turning angle negated. Where a boundary stops the axis, its further points lie at the stop.
+    Where a boundary stops the axis, its further points lie at the stop.
     """
     if shape.point_count == 1:
         return Axis(root.point(), np.array([root.heading]), np.zeros(1))
-    chains, bends = axis_chains(shape, mirrored=mirrored, unit=unit)
+    chains, bends = axis_chains(shape)
     starts = root.point()[np.zeros(len(bends), np.int64)]
     trace = trace_chains(mesh, starts, chains.first * root.heading, chains.offsets, chains.turns, chains.lengths)
     tangents = np.concatenate([[root.heading], trace.headings * bends])  # (m,)
@@ -114,12 +113,12 @@ def reconstruct_axis(
     return Axis(points, tangents / np.abs(tangents), np.concatenate([[0.0], trace.remaining]))
 
 
-def axis_chains(shape: AxisShape, *, mirrored: bool, unit: float) -> tuple[Chains, ComplexArray]:
+def axis_chains(shape: AxisShape) -> tuple[Chains, ComplexArray]:
     """The walks from the root to the m - 1 further points of an axis, and how its tangent turns where each arrives
     (unit complex, (m - 1,))."""
-    turns = -shape.turning_angles if mirrored else shape.turning_angles  # (m - 2,)
+    turns = shape.traced_turns  # (m - 2,)
     bends = np.exp(1j * np.concatenate([turns, np.zeros(shape.point_count - 1 - len(turns))]))
-    return _prefix_chains(shape.lengths * (shape.along * unit), turns), bends
+    return _prefix_chains(shape.lengths * shape.along, turns), bends
 
 
 def root_from_point(
@@ -128,9 +127,6 @@ def root_from_point(
     index: int,
     point: SurfacePoints,
     tangent: complex,
-    *,
-    mirrored: bool = False,
-    unit: float = 1.0,
 ) -> tuple[Root, float]:
     """The root from which the axis passes its point `index` at `point` with `tangent` there.
 
@@ -139,8 +135,8 @@ def root_from_point(
     """
     if index == 0:
         return Root.at(point, tangent), 0.0
-    turns = -shape.turning_angles if mirrored else shape.turning_angles
-    lengths = shape.lengths[:index][::-1] * (shape.along * unit)
+    turns = shape.traced_turns
+    lengths = shape.lengths[:index][::-1] * shape.along
     last = index == shape.point_count - 1
     arriving = tangent if last else tangent * np.exp(-1j * turns[index - 1])  # of the forward segment at `index`
     back = trace_chains(

@@ -54,15 +54,13 @@ def parameterize_patch(
     *,
     anchors: IntArray | None = None,
     shape: AxisShape | None = None,
-    mirrored: bool = False,
-    unit: float = 1.0,
     engine: GeodesicEngine = EXACT,
 ) -> PatchCoordinates:
     """Coordinates of n points relative to an axis (paper: Algorithm 2, z = r theta / T).
 
     Each point is anchored at its closest axis point, or at the axis point that anchors (n,) name (-1: the closest).
-    shape, mirrored, unit: those that `axis` was reconstructed with; the coordinates returned are free of their
-    scaling and mirroring. engine: measures the geodesics; reconstruction is as exact as the engine.
+    shape: that `axis` was reconstructed from; the coordinates returned are free of its scaling and mirroring.
+    engine: measures the geodesics; reconstruction is as exact as the engine.
     Raises InvalidInput naming the first point that no axis point reaches.
     """
     if anchors is None:
@@ -71,26 +69,22 @@ def parameterize_patch(
         coordinates = _relative(log, axis.tangents[log.anchor], log.anchor)
     else:
         coordinates = _bound(mesh, axis, points, np.asarray(anchors, dtype=np.int64), engine)
-    return _unshaped(coordinates, shape, mirrored, unit)
+    return coordinates if shape is None else _unshaped(coordinates, shape)
 
 
 def reconstruct_patch(
     mesh: TriangleMesh,
     shape: PatchShape,
     root: Root,
-    *,
     axis_shape: AxisShape | None = None,
-    mirrored: bool = False,
-    unit: float = 1.0,
 ) -> PatchPoints:
     """The patch of `shape` at a root (paper: Algorithm 4, z t' or, mirrored, conj(z) t').
 
-    axis_shape: in place of the shape's own axis (a deviation). unit: factor on all lengths, for a surface in other
-    units than the shape's.
+    axis_shape: in place of the shape's own axis: bent, scaled, or as it lies on another surface
+    (`AxisShape.transformed`).
     """
     axis_shape = axis_shape or shape.axis
-    axis = reconstruct_axis(mesh, axis_shape, root, mirrored=mirrored, unit=unit)
-    return points_from_axis(mesh, shape.coordinates, axis, axis_shape, mirrored=mirrored, unit=unit)
+    return points_from_axis(mesh, shape.coordinates, reconstruct_axis(mesh, axis_shape, root), axis_shape)
 
 
 def points_from_axis(
@@ -98,12 +92,9 @@ def points_from_axis(
     coordinates: PatchCoordinates,
     axis: Axis,
     axis_shape: AxisShape,
-    *,
-    mirrored: bool = False,
-    unit: float = 1.0,
 ) -> PatchPoints:
     """The points of a patch whose axis is reconstructed: one geodesic from the axis each, all in one batch."""
-    legs, angles, lengths = patch_chains(coordinates, axis_shape, mirrored=mirrored, unit=unit)
+    legs, angles, lengths = patch_chains(coordinates, axis_shape)
     anchors = coordinates.anchors
     trace = trace_chains(
         mesh, axis.points[anchors], legs * axis.tangents[anchors], coordinates.chain_starts, angles, lengths
@@ -112,13 +103,13 @@ def points_from_axis(
 
 
 def patch_chains(
-    coordinates: PatchCoordinates, axis_shape: AxisShape, *, mirrored: bool, unit: float
+    coordinates: PatchCoordinates, axis_shape: AxisShape
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """The geodesics from the anchors to n points: first legs (n,) relative to the anchors' tangents, then turning
     angles and lengths of the legs that follow (rows by `coordinates.chain_starts`)."""
-    legs, lengths = scaled_legs(coordinates, axis_shape.along * unit, axis_shape.spread * unit)
+    legs, lengths = scaled_legs(coordinates, axis_shape.along, axis_shape.spread)
     angles = coordinates.chain_angles
-    return (np.conj(legs), -angles, lengths) if mirrored else (legs, angles, lengths)
+    return (np.conj(legs), -angles, lengths) if axis_shape.mirrored else (legs, angles, lengths)
 
 
 def transfer_patch(
@@ -126,8 +117,8 @@ def transfer_patch(
 ) -> PatchPoints:
     """Parameterize on one mesh, reconstruct as the mirror image on another: the paper's Algorithm 5 in one go."""
     coordinates = parameterize_patch(mesh, axis, points)
-    placed = reconstruct_axis(target, axis_shape, root, mirrored=True)
-    return points_from_axis(target, coordinates, placed, axis_shape, mirrored=True)
+    mirrored = axis_shape.transformed(mirrored=True)
+    return points_from_axis(target, coordinates, reconstruct_axis(target, mirrored, root), mirrored)
 
 
 def scaled_legs(coordinates: PatchCoordinates, along: float, spread: float) -> tuple[ComplexArray, FloatArray]:
@@ -143,14 +134,11 @@ def scaled_legs(coordinates: PatchCoordinates, along: float, spread: float) -> t
     return stretched, lengths * np.repeat(growth, np.diff(coordinates.chain_starts))
 
 
-def _unshaped(
-    coordinates: PatchCoordinates, shape: AxisShape | None, mirrored: bool, unit: float
-) -> PatchCoordinates:
+def _unshaped(coordinates: PatchCoordinates, shape: AxisShape) -> PatchCoordinates:
     """Coordinates measured on a scaled or mirrored axis, as they are on the axis before that."""
-    along, spread = (shape.along * unit, shape.spread * unit) if shape is not None else (unit, unit)
-    legs, lengths = scaled_legs(coordinates, 1.0 / along, 1.0 / spread)
+    legs, lengths = scaled_legs(coordinates, 1.0 / shape.along, 1.0 / shape.spread)
     angles = coordinates.chain_angles
-    if mirrored:
+    if shape.mirrored:
         legs, angles = np.conj(legs), -angles
     return PatchCoordinates(coordinates.anchors, legs, coordinates.chain_starts, angles, lengths)
 

@@ -20,13 +20,15 @@ class AxisShape:
 
     lengths: (s,) surface units; empty for an axis of one point. turning_angles: (s - 1,) radians at the interior
     points, from the ending direction of one segment to the initial direction of the next (paper: phi).
-    along: factor on all lengths along the axis. spread: factor on distances across it.
+    along: factor on all lengths along the axis. spread: factor on distances across it. mirrored: traced as the
+    mirror image: turning angles, and the sides that patch points lie on, change sign.
     """
 
     lengths: FloatArray
     turning_angles: FloatArray
     along: float = 1.0
     spread: float = 1.0
+    mirrored: bool = False
 
     def __post_init__(self) -> None:
         lengths = frozen(self.lengths, np.float64, (None,), "lengths of an axis")
@@ -51,7 +53,20 @@ class AxisShape:
     @cached_property
     def digest(self) -> str:
         """Content digest."""
-        return digest(self.lengths, self.turning_angles, np.array([self.along, self.spread]))
+        content = digest(self.lengths, self.turning_angles, np.array([self.along, self.spread]))
+        return f"{content} mirrored" if self.mirrored else content
+
+    @property
+    def traced_turns(self) -> FloatArray:
+        """(s - 1,) turning angles as they are traced, in radians: negated where the axis is mirrored."""
+        return -self.turning_angles if self.mirrored else self.turning_angles
+
+    def transformed(self, *, mirrored: bool = False, unit: float = 1.0) -> AxisShape:
+        """The axis as it is traced on another surface. mirrored: as the mirror image of this one. unit: of that
+        surface's lengths per unit of these."""
+        if not mirrored and unit == 1.0:
+            return self
+        return replace(self, along=self.along * unit, spread=self.spread * unit, mirrored=self.mirrored != mirrored)
 
     def bent(self, point: int, angle: float) -> AxisShape:
         """The same axis with turning angle `angle` (radians) at interior point `point`."""

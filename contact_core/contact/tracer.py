@@ -24,12 +24,15 @@ from contact_core.geometry.tracing import trace_chains
 
 @dataclass(frozen=True, eq=False)
 class ShapedPatch:
-    """A patch without its root: the other arguments of `reconstruct_patch`."""
+    """A patch without its root. axis: in place of the shape's own, as `reconstruct_patch` takes it."""
 
     shape: PatchShape
     axis: AxisShape | None = None
-    mirrored: bool = False
-    unit: float = 1.0
+
+    @property
+    def traced_axis(self) -> AxisShape:
+        """The axis that its points are traced from."""
+        return self.axis or self.shape.axis
 
 
 class TracedPatches(NamedTuple):
@@ -64,7 +67,7 @@ class PatchTracer:
         self.mesh = mesh
         counts = [len(patch.shape.coordinates) for patch in patches]
         self.patch_of_point: IntArray = np.repeat(np.arange(len(patches)), counts)
-        axes = [axis_chains(p.axis or p.shape.axis, mirrored=p.mirrored, unit=p.unit) for p in patches]
+        axes = [axis_chains(patch.traced_axis) for patch in patches]
         self._bends = _joined([bends for _, bends in axes], complex)
         self._axis_walks = _concatenated(
             (np.full(len(bends), i), chains.first.astype(complex), chains.offsets, chains.turns, chains.lengths)
@@ -77,9 +80,7 @@ class PatchTracer:
         for i, patch in enumerate(patches):
             coordinates = patch.shape.coordinates
             anchors = coordinates.anchors
-            legs, turns, lengths = patch_chains(
-                coordinates, patch.axis or patch.shape.axis, mirrored=patch.mirrored, unit=patch.unit
-            )
+            legs, turns, lengths = patch_chains(coordinates, patch.traced_axis)
             origin = np.where(anchors == 0, i, ends[i] + anchors - 1)
             parts.append((origin, legs, coordinates.chain_starts, turns, lengths))
         self._point_walks = _concatenated(parts)

@@ -227,6 +227,16 @@ class ContactDocument:
                 angles[point - 1] += angle
         return AxisShape(axis.lengths, angles, axis.along * patch.along, axis.spread * patch.spread)
 
+    def unit(self, name: str) -> float:
+        """Units of a patch's surface per unit of its shape."""
+        patch = self.patch(name)
+        return self.shapes[patch.shape].meters_per_unit / self.surface(patch.surface).meters_per_unit
+
+    def surface_axis(self, name: str) -> AxisShape:
+        """The axis shape of a patch as it is traced on its surface: its own deviation, mirrored where the patch
+        is, in the surface's units."""
+        return self.effective_axis(name).transformed(mirrored=self.patch(name).mirrored, unit=self.unit(name))
+
     def partners(self, name: str) -> tuple[str, ...]:
         """All other patches that share the shape of a patch."""
         key = self.patch(name).shape

@@ -105,11 +105,6 @@ class Derived:
         """The points of the axis of a patch on its surface's own mesh."""
         return self.seen(document, document.patch(name).surface, self.axis(document, name).points)
 
-    def unit(self, document: ContactDocument, name: str) -> float:
-        """Surface units of a patch's surface per unit of its shape."""
-        patch = document.patch(name)
-        return document.shapes[patch.shape].meters_per_unit / document.surface(patch.surface).meters_per_unit
-
     def root(self, document: ContactDocument, name: str) -> Root:
         """Where the axis of a patch starts, for a child as its parent's axis leads there."""
         self._trace_ancestors(document, name)
@@ -135,14 +130,12 @@ class Derived:
             self._axis(document, ancestor)
 
     def _axis(self, document: ContactDocument, name: str) -> Axis:
-        patch = document.patch(name)
-        shape = document.effective_axis(name)
+        surface, shape = document.patch(name).surface, document.surface_axis(name)
 
         def trace() -> Axis:
             self.computed += 1
             root, cut = self._root_and_cut(document, name)
-            mesh, unit = self.carrier(document, patch.surface), self.unit(document, name)
-            axis = reconstruct_axis(mesh, shape, root, mirrored=patch.mirrored, unit=unit)
+            axis = reconstruct_axis(self.carrier(document, surface), shape, root)
             return axis if cut == 0.0 else replace(axis, remaining=axis.remaining + cut)
 
         return self._cached(("axis", self._axis_key(document, name)), shape.point_count, trace)
@@ -155,14 +148,8 @@ class Derived:
         def trace() -> PatchPoints:
             axis = self.axis(document, name)
             self.computed += 1
-            return points_from_axis(
-                self.carrier(document, patch.surface),
-                coordinates,
-                axis,
-                document.effective_axis(name),
-                mirrored=patch.mirrored,
-                unit=self.unit(document, name),
-            )
+            carrier = self.carrier(document, patch.surface)
+            return points_from_axis(carrier, coordinates, axis, document.surface_axis(name))
 
         return self._cached(("points", *self.key(document, name)), len(coordinates), trace)
 
@@ -182,18 +169,10 @@ class Derived:
         return self._cached(key, 1, lambda: self._linked_root(document, name, link))
 
     def _linked_root(self, document: ContactDocument, name: str, link: Link) -> tuple[Root, float]:
-        patch = document.patch(name)
-        mesh, parent = self.carrier(document, patch.surface), self._axis(document, link.parent)
+        mesh = self.carrier(document, document.patch(name).surface)
+        parent = self._axis(document, link.parent)
         point, tangent, cut = follow_link(mesh, parent, link)
-        root, cut_off = root_from_point(
-            mesh,
-            document.effective_axis(name),
-            link.own_point,
-            point,
-            tangent,
-            mirrored=patch.mirrored,
-            unit=self.unit(document, name),
-        )
+        root, cut_off = root_from_point(mesh, document.surface_axis(name), link.own_point, point, tangent)
         return root, cut + cut_off + float(parent.remaining[link.parent_point])
 
     def _axis_key(self, document: ContactDocument, name: str) -> Hashable:
@@ -203,11 +182,9 @@ class Derived:
 
     def _shape_key(self, document: ContactDocument, name: str) -> Hashable:
         patch = document.patch(name)
-        surface = document.surface(patch.surface)
-        shape = document.shapes[patch.shape]
-        unit = shape.meters_per_unit / surface.meters_per_unit
-        own = (patch.turns, patch.along, patch.spread)
-        return surface.carrier_digest, shape.axis.digest, own, patch.mirrored, unit
+        own = (patch.turns, patch.along, patch.spread, patch.mirrored)
+        carrier = document.surface(patch.surface).carrier_digest
+        return carrier, document.shapes[patch.shape].axis.digest, own, document.unit(name)
 
     def _cached(self, key: Hashable, size: int, make: Callable[[], T]) -> T:
         kept = self._kept.get(key)

@@ -185,10 +185,6 @@ class DocumentGeometry:
         """Where the axis of a patch starts now, whether it is the child of another or not; on `carrier_of`."""
         return self._derived.root(self.document, patch)
 
-    def unit(self, patch: str) -> float:
-        """Surface units of a patch's surface per unit of its shape."""
-        return self._derived.unit(self.document, patch)
-
     def reconstruction(self, patch: str) -> PatchPoints:
         """A patch where it is now, with what ran off a boundary; on the mesh that it runs on (`carrier_of`)."""
         return self._derived.patch(self.document, patch)

@@ -208,12 +208,7 @@ class _Motion:
         kept = self.__dict__.setdefault("_slides", {})
         if name not in kept:
             document, patch = self.timed, self.timed.patch(name)
-            shaped = ShapedPatch(
-                document.shapes[patch.shape],
-                document.effective_axis(name),
-                patch.mirrored,
-                draft.derived.unit(document, name),
-            )
+            shaped = ShapedPatch(document.shapes[patch.shape], document.surface_axis(name))
             mesh = draft.derived.carrier(document, patch.surface)
             kept[name] = SlidingPatch(mesh, shaped, PlacementKeys(track.of(PlacementKey)))
         found: SlidingPatch = kept[name]

@@ -250,9 +250,7 @@ def _sliding_patches(
                 slack * problem.manipulator_length / uniform_scale(body.world_from_rig),
                 turn=turn,
                 penalty=penalty,
-                mirrored=patch.mirrored,
-                unit=draft.derived.unit(document, pair.object),
-                axis=document.effective_axis(pair.object),
+                axis=document.surface_axis(pair.object),
             )
         )
     return patches, left_out

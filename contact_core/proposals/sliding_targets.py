@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from contact_core.arrays import ComplexArray, FloatArray
-from contact_core.contact.patch import scaled_legs
+from contact_core.contact.patch import patch_chains
 from contact_core.contact.placement import Root
 from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.contact.tracer import PatchTracer, ShapedPatch, TracedPatches
@@ -33,8 +33,8 @@ class SlidingPatch:
     """A target patch that may slide. contact: name of the pair in the problem; its points are `shape` at `root`.
 
     slack: how far the root may go, surface units. turn: how far the heading may turn, radians. penalty: prior
-    weight of a slide by the whole slack or a turn by the whole turn. mirrored, unit, axis: as in
-    `reconstruct_patch`.
+    weight of a slide by the whole slack or a turn by the whole turn. axis: in place of the shape's own, as
+    `reconstruct_patch` takes it.
     """
 
     contact: str
@@ -43,8 +43,6 @@ class SlidingPatch:
     slack: float
     turn: float = np.pi / 4.0
     penalty: float = 1.0
-    mirrored: bool = True
-    unit: float = 1.0
     axis: AxisShape | None = None
 
     def __post_init__(self) -> None:
@@ -76,7 +74,7 @@ class SlidingTargets:
     ) -> None:
         self.surface, self.patches, self.world = surface, tuple(patches), np.asarray(world_from_surface, float)
         self.dofs = [BlackBoxDof(name, -1.0, 1.0, patch.penalty) for patch in patches for name in patch.dof_names]
-        self.tracer = PatchTracer(surface, [ShapedPatch(p.shape, p.axis, p.mirrored, p.unit) for p in patches])
+        self.tracer = PatchTracer(surface, [ShapedPatch(patch.shape, patch.axis) for patch in patches])
         self._starts = SurfacePoints.concatenate(patch.root.point() for patch in patches)
         self._headings = np.array([patch.root.heading for patch in patches])
         self.has = np.concatenate([[True, True, patch.turn > 0.0] for patch in patches])  # (3 n,) which dofs exist
@@ -202,18 +200,17 @@ def _unfold(patch: SlidingPatch) -> tuple[ComplexArray, ComplexArray]:
     """A patch laid out in the plane along its paths, the root at 0 heading along 1: points (k,) and the unit
     directions (k,) in which their paths end."""
     shape, coordinates = patch.axis or patch.shape.axis, patch.shape.coordinates
-    sign = -1.0 if patch.mirrored else 1.0
-    turns = np.concatenate([[0.0], sign * shape.turning_angles, [0.0]])[: shape.point_count]
+    turns = np.concatenate([[0.0], shape.traced_turns, [0.0]])[: shape.point_count]
     headings = np.exp(1j * np.cumsum(turns))  # (m,) as `Axis.tangents`
-    steps = shape.lengths * (shape.along * patch.unit) * headings[:-1]
+    steps = shape.lengths * shape.along * headings[:-1]
     knots = np.concatenate([[0.0], np.cumsum(steps)])  # (m,)
-    legs, lengths = scaled_legs(coordinates, shape.along * patch.unit, shape.spread * patch.unit)
-    first = (legs.conj() if patch.mirrored else legs) * headings[coordinates.anchors]
+    legs, angles, lengths = patch_chains(coordinates, shape)
+    first = legs * headings[coordinates.anchors]
     size = np.abs(first)
     ends = np.where(size > 0.0, first / np.where(size > 0.0, size, 1.0), headings[coordinates.anchors])
     points = knots[coordinates.anchors] + first
     for i in np.flatnonzero(np.diff(coordinates.chain_starts)):
         for row in range(coordinates.chain_starts[i], coordinates.chain_starts[i + 1]):
-            ends[i] *= np.exp(1j * sign * coordinates.chain_angles[row])
+            ends[i] *= np.exp(1j * angles[row])
             points[i] += lengths[row] * ends[i]
     return points, ends

@@ -145,14 +145,8 @@ def tube(points: FloatArray, radius: float, sides: int = 8) -> TriangleMesh:
 def spokes(session: Session, patch: str, every: int = 1) -> FloatArray:
     """(k, 2, 3) segments of the geodesics from a patch's axis to every so manieth of its points."""
     document, mesh, axis = session.document, session.geometry.mesh_of(patch), session.geometry.axis(patch)
-    shape, record = document.shape_of(patch), document.patch(patch)
-    coordinates = shape.coordinates
-    legs, angles, lengths = patch_chains(
-        coordinates,
-        document.effective_axis(patch),
-        mirrored=record.mirrored,
-        unit=session.derived.unit(document, patch),
-    )
+    coordinates = document.shape_of(patch).coordinates
+    legs, angles, lengths = patch_chains(coordinates, document.surface_axis(patch))
     anchors = coordinates.anchors
     traced = trace_chains(
         mesh, axis.points[anchors], legs * axis.tangents[anchors], coordinates.chain_starts, angles, lengths,

@@ -43,4 +43,4 @@ def boundary_alone(
     chain, drawn = draw_axis(mesh, points[[*loop, loop[0]]], dense=False)
     way = link_to(mesh, "axis", axis, drawn.points[0], complex(drawn.tangents[0]))
     point, tangent, _ = follow_link(target, placed, way.mirrored())
-    return reconstruct_axis(target, chain, Root.at(point, tangent), mirrored=True), chain.length
+    return reconstruct_axis(target, chain.transformed(mirrored=True), Root.at(point, tangent)), chain.length

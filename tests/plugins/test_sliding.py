@@ -47,7 +47,7 @@ def spread_too_far(movable: bool = True) -> tuple[PoseProblem, list[SlidingPatch
         shape, root, points = patch_at(there, 1.0)
         mine = at(STAMP, [(x - there + here, y) for x, y, _ in points.positions(FLOOR)])
         contacts.append(PairedPoints(name, "stamp", mine, "floor", points))
-        sliding.append(SlidingPatch(name, shape, root, slack=0.2, penalty=0.01, mirrored=False))
+        sliding.append(SlidingPatch(name, shape, root, slack=0.2, penalty=0.01))
     bodies = (Body.rigid("stamp", STAMP, movable=movable), Body.rigid("floor", FLOOR))
     return PoseProblem(bodies, tuple(contacts)), sliding
 
@@ -137,10 +137,10 @@ def test_derivatives_on_a_curved_surface(mirrored: bool) -> None:
     near = axis.points[tip].positions(ball) + random.normal(0.0, 0.15, (12, 3))
     points = Locator.of(ball).closest(near).points
     shape = PatchShape(axis_shape, parameterize_patch(ball, axis, points), np.ones(12))
-    bent = replace(axis_shape, along=1.2, spread=0.9)
+    bent = replace(axis_shape, along=1.2, spread=0.9).transformed(mirrored=mirrored, unit=1.1)
     world = np.diag([2.0, 2.0, 2.0, 1.0])
-    patch = SlidingPatch("c", shape, axis.root(), 0.2, mirrored=mirrored, unit=1.1, axis=bent)
-    meant = reconstruct_patch(ball, shape, axis.root(), axis_shape=bent, mirrored=mirrored, unit=1.1).points
+    patch = SlidingPatch("c", shape, axis.root(), 0.2, axis=bent)
+    meant = reconstruct_patch(ball, shape, axis.root(), bent).points
     evaluate = SlidingTargets(ball, [patch], world, [meant]).watch(meant)
     assert isinstance(evaluate, Differentiable)
     theta, step = np.array([0.31, -0.22, 0.17]), 1e-7

@@ -97,9 +97,7 @@ class VerbGroup:
             self._geometry.axis(patch),
             points,
             anchors=anchors,
-            shape=self._document.effective_axis(patch),
-            mirrored=self._document.patch(patch).mirrored,
-            unit=self._geometry.unit(patch),
+            shape=self._document.surface_axis(patch),
             engine=self._editor.derived.engine,
         )
 
@@ -158,13 +156,7 @@ class VerbGroup:
 
     def _axis_from(self, patch: str, root: Root) -> Axis:
         """The axis that the patch would have at another root."""
-        return reconstruct_axis(
-            self._geometry.carrier_of(patch),
-            self._document.effective_axis(patch),
-            root,
-            mirrored=self._document.patch(patch).mirrored,
-            unit=self._geometry.unit(patch),
-        )
+        return reconstruct_axis(self._geometry.carrier_of(patch), self._document.surface_axis(patch), root)
 
 
 class EditorApart:

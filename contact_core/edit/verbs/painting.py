@@ -250,7 +250,7 @@ class PaintingVerbs(VerbGroup):
 
     def _area_unit(self, patch: str) -> float:
         """Square surface units of the patch's surface per square unit of its shape."""
-        return self._geometry.unit(patch) ** 2
+        return self._document.unit(patch) ** 2
 
     def _removal(self, patches: tuple[str, ...]) -> Remove:
         """Remove patches, with roots for the children that stay."""

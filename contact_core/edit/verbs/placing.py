@@ -74,12 +74,10 @@ class PlacingVerbs(VerbGroup):
         self._check_axis_point(patch, about)
         root, cut = root_from_point(
             self._geometry.carrier_of(patch),
-            self._document.effective_axis(patch),
+            self._document.surface_axis(patch),
             about,
             axis.points[about],
             complex(axis.tangents[about]) * turn,
-            mirrored=self._document.patch(patch).mirrored,
-            unit=self._geometry.unit(patch),
         )
         if cut > 0.0:
             raise CommandRejected(f"turned about point {about}, the axis of {patch!r} would start off the surface.")

@@ -58,12 +58,12 @@ def plan_rebind(editor: Editor, new: Surface, mesh: TriangleMesh) -> tuple[Rebin
     for name in on_it:
         patch = document.patch(name)
         shape = shapes.get(patch.shape, document.shapes[patch.shape])
-        unit = shape.meters_per_unit / new.meters_per_unit
         own = _effective(shape, patch.turns if name not in axes else (), patch.along, patch.spread, name in axes)
+        own = own.transformed(mirrored=patch.mirrored, unit=shape.meters_per_unit / new.meters_per_unit)
         if name not in axes:
             root = _projected_root(editor.geometry.root(name), old_mesh, mesh)
-            axes[name] = reconstruct_axis(mesh, own, root, mirrored=patch.mirrored, unit=unit)
-        points = points_from_axis(mesh, shape.coordinates, axes[name], own, mirrored=patch.mirrored, unit=unit)
+            axes[name] = reconstruct_axis(mesh, own, root)
+        points = points_from_axis(mesh, shape.coordinates, axes[name], own)
         with contextlib.suppress(NotManifold):  # a copy that could not be walked where it was moved no distance
             before = editor.geometry.reconstruction(name).points.positions(old_mesh)
             moves[name] = float(np.linalg.norm(points.points.positions(mesh) - before, axis=1).max(initial=0.0))
@@ -112,10 +112,9 @@ def _projected_shape(
     drawn, axis = draw_axis(mesh, axis_points, heading, dense=False)
     points = _closest(editor.geometry.reconstruction(name).points, old_mesh, mesh)
     unit = old.meters_per_unit / new.meters_per_unit
-    coordinates = parameterize_patch(
-        mesh, axis, points, mirrored=patch.mirrored, unit=unit, engine=editor.derived.engine
-    )
-    turns = -drawn.turning_angles if patch.mirrored else drawn.turning_angles
+    there = drawn.transformed(mirrored=patch.mirrored, unit=unit)
+    coordinates = parameterize_patch(mesh, axis, points, shape=there, engine=editor.derived.engine)
+    turns = there.traced_turns
     own = dict(patch.turns)
     if own and len(turns):  # the deviation stays the patch's own
         turns = turns - np.array([own.get(k + 1, 0.0) for k in range(len(turns))])

@@ -70,14 +70,14 @@ class ReshapingVerbs(PaintingVerbs):
         """A new axis under a patch: coordinates anew, and placements that keep everything where it is."""
         source = self._document.patch(patch)
         mesh = self._geometry.carrier_of(patch)
-        unit = self._geometry.unit(patch)
+        unit = self._document.unit(patch)
         if source.turns or source.along != 1.0 or source.spread != 1.0:
             raise CommandRejected(
                 f"{patch!r} deviates from the shape that it shares: draw the axis on the original, or detach it."
             )
-        coordinates = parameterize_patch(mesh, axis, points, mirrored=source.mirrored, unit=unit)
-        turns = -shape.turning_angles if source.mirrored else shape.turning_angles
-        drawn = AxisShape(shape.lengths / unit, turns)
+        there = shape.transformed(mirrored=source.mirrored, unit=unit)
+        coordinates = parameterize_patch(mesh, axis, points, shape=there)
+        drawn = AxisShape(shape.lengths / unit, there.traced_turns)
         old = self._document.shapes[source.shape]
         new = replace(old, axis=drawn, coordinates=coordinates)
         placements: list[tuple[str, Placement]] = []
@@ -95,7 +95,7 @@ class ReshapingVerbs(PaintingVerbs):
         way = link_to(self._geometry.carrier_of(patch), patch, here, axis.points[0], complex(axis.tangents[0]))
         if self._document.patch(patch).mirrored != self._document.patch(partner).mirrored:
             way = way.mirrored()
-        ratio = self._geometry.unit(partner) / self._geometry.unit(patch)
+        ratio = self._document.unit(partner) / self._document.unit(patch)
         point, tangent, _ = follow_link(self._geometry.carrier_of(partner), there, way.scaled(ratio))
         return Root.at(point, tangent)
 

@@ -42,16 +42,13 @@ def test_together_as_one_by_one(name: str) -> None:
     """Axes of one point and of many, mirrored, scaled, other units; points on the axis, bent paths, boundaries."""
     mesh = MESHES[name]()
     patches = [shaped(mesh, 1, 0), shaped(mesh, 3, 1), shaped(mesh, 2, 2), shaped(mesh, 2, 3, count=0)]
-    patches[1] = replace(patches[1], mirrored=True, unit=0.6)
-    patches[2] = replace(patches[2], axis=replace(patches[2].shape.axis, along=1.3, spread=0.7), mirrored=True)
+    patches[1] = replace(patches[1], axis=patches[1].shape.axis.transformed(mirrored=True, unit=0.6))
+    patches[2] = replace(patches[2], axis=replace(patches[2].shape.axis, along=1.3, spread=0.7, mirrored=True))
     roots, headings = points_on(mesh, len(patches), 9), np.exp(1j * np.arange(len(patches)))
     together = PatchTracer(mesh, patches)
     found = together.trace(roots, headings)
     for i, patch in enumerate(patches):
-        alone = reconstruct_patch(
-            mesh, patch.shape, Root.at(roots[i], complex(headings[i])),
-            axis_shape=patch.axis, mirrored=patch.mirrored, unit=patch.unit,
-        )  # fmt: skip
+        alone = reconstruct_patch(mesh, patch.shape, Root.at(roots[i], complex(headings[i])), patch.axis)
         rows = together.patch_of_point == i
         assert found.points[rows].same_as(alone.points)
         anchors = patch.shape.coordinates.anchors

@@ -265,7 +265,7 @@ def test_units_are_converted_in_transfer(session: Session) -> None:
     """From centimetres to metres and back onto the first surface: every length comes out as it was."""
     session.patches.transfer("palm", "sphere", point_on(session, "sphere", 10), heading=1.0, name="there")
     source, copy = session.geometry.axis("palm"), session.geometry.axis("there")
-    assert session.derived.unit(session.document, "there") == pytest.approx(0.01)
+    assert session.document.unit("there") == pytest.approx(0.01)
     steps = np.linalg.norm(np.diff(source.points.positions(session.geometry.mesh("torus")), axis=0), axis=1).sum()
     shape = session.document.shape_of("palm").axis
     assert steps == pytest.approx(shape.length, rel=1e-6)
