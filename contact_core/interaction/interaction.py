@@ -65,7 +65,7 @@ class Interaction:
     def close(self) -> None:
         """Put back what is under way, stop the work, and listen no more. The session stays open."""
         self.cancel()
-        self.worker.drop()
+        self.worker.close()
         self._stop_listening()
 
     # -- what is in the hand ---------------------------------------------------------------------------------

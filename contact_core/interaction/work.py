@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -17,6 +18,7 @@ from contact_core.errors import Cancelled, ContactError
 from contact_core.progress import Progress
 
 log = logging.getLogger(__name__)
+_PATIENCE = 20.0  # seconds that the end waits for work that was told to stop
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Worker:
 
     def __init__(self) -> None:
         self._piece: _Piece | None = None
+        self._dropped: list[_Piece] = []  # told to stop, and perhaps not yet over
 
     @property
     def status(self) -> WorkStatus | None:
@@ -91,12 +94,25 @@ class Worker:
         if self._piece is not None:
             self._piece.stop.set()
             if self._piece.some:
-                self._piece = None
+                self._let_go()
 
     def drop(self) -> None:
         """Stop the work and forget what it finds."""
         self.cancel()
-        self._piece = None
+        self._let_go()
+
+    def close(self) -> None:
+        """The end: stop, and wait until no thread is left. One that runs compiled code when the interpreter ends
+        takes the whole process down with an abort."""
+        self.drop()
+        until = time.monotonic() + _PATIENCE
+        for piece in self._dropped:
+            piece.thread.join(max(0.0, until - time.monotonic()))
+
+    def _let_go(self) -> None:
+        if self._piece is not None:
+            self._dropped = [*(each for each in self._dropped if not each.over.is_set()), self._piece]
+            self._piece = None
 
     def poll(self) -> bool:
         """Hand over the result of work that is over; whether there was one.

@@ -28,13 +28,47 @@ def application(sources: list[str], state: Path, size: tuple[int, int] = SIZE) -
     return app
 
 
-class Hand:
+class Sight:
+    """Somebody who sees where on the screen things are."""
+
+    def __init__(self, app: Application) -> None:
+        self.app = app
+
+    def pixel(self, point: Any) -> Any:
+        """(2,) where a world point is on the screen."""
+        seen = self.app.canvas.eye.project(np.asarray(point, float)[None])[0]
+        assert seen[2] > 0
+        return seen[:2]
+
+    def on_joint(self, surface: str, joint: str) -> Any:
+        """(2,) a pixel of the skin that a joint carries and that faces the eye."""
+        rig, seen = self.app.session.rigs[surface], self.app.interaction.desk.scene.surfaces[surface]
+        carried = ((rig.skin_joints == rig.joint_index(joint)) * rig.skin_weights).sum(axis=1) > 0.9
+        facing = seen.mesh.vertex_normals @ self.app.canvas.eye.direction < -0.7
+        candidates = seen.points[carried & facing]
+        middle = candidates.mean(axis=0)
+        return self.pixel(candidates[np.linalg.norm(candidates - middle, axis=1).argmin()])
+
+    def on_patch(self, name: str, share: float = 0.5) -> Any:
+        """(2,) a pixel of a patch, a share of the way along its axis, aside from it by nothing."""
+        shown = self.app.interaction.desk.shown
+        seen = self.app.interaction.desk.scene.surfaces[self.app.session.document.patch(name).surface]
+        points = seen.positions(shown.axis(name).points)
+        return self.pixel(points[round(share * (len(points) - 1))])
+
+    def on_thing(self, surface: str) -> Any:
+        """(2,) the pixel of the middle of a thing."""
+        points = self.app.interaction.desk.scene.surfaces[surface].points
+        return self.pixel(0.5 * (points.min(axis=0) + points.max(axis=0)))
+
+
+class Hand(Sight):
     """Somebody's hand on mouse and keys: every event goes through a VTK interactor, as in a window."""
 
     def __init__(self, app: Application) -> None:
         from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 
-        self.app = app
+        super().__init__(app)
         self._interactor = vtkGenericRenderWindowInteractor()
         self._interactor.SetRenderWindow(app.canvas.window)
         app.canvas.render()
@@ -75,30 +109,3 @@ class Hand:
             self.front.tick()
             time.sleep(0.01)
         self.front.tick()
-
-    def pixel(self, point: Any) -> Any:
-        """(2,) where a world point is on the screen."""
-        seen = self.app.canvas.eye.project(np.asarray(point, float)[None])[0]
-        assert seen[2] > 0
-        return seen[:2]
-
-    def on_joint(self, surface: str, joint: str) -> Any:
-        """(2,) a pixel of the skin that a joint carries and that faces the eye."""
-        rig, seen = self.app.session.rigs[surface], self.app.interaction.desk.scene.surfaces[surface]
-        carried = ((rig.skin_joints == rig.joint_index(joint)) * rig.skin_weights).sum(axis=1) > 0.9
-        facing = seen.mesh.vertex_normals @ self.app.canvas.eye.direction < -0.7
-        candidates = seen.points[carried & facing]
-        middle = candidates.mean(axis=0)
-        return self.pixel(candidates[np.linalg.norm(candidates - middle, axis=1).argmin()])
-
-    def on_patch(self, name: str, share: float = 0.5) -> Any:
-        """(2,) a pixel of a patch, a share of the way along its axis, aside from it by nothing."""
-        shown = self.app.interaction.desk.shown
-        seen = self.app.interaction.desk.scene.surfaces[self.app.session.document.patch(name).surface]
-        points = seen.positions(shown.axis(name).points)
-        return self.pixel(points[round(share * (len(points) - 1))])
-
-    def on_thing(self, surface: str) -> Any:
-        """(2,) the pixel of the middle of a thing."""
-        points = self.app.interaction.desk.scene.surfaces[surface].points
-        return self.pixel(0.5 * (points.min(axis=0) + points.max(axis=0)))

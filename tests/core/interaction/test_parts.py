@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -167,6 +168,22 @@ def test_work_that_is_replaced_or_fails() -> None:
     with pytest.raises(ContactError, match="Third failed"):
         worker.poll()
     assert worker.status is None and found == [2]
+
+
+def test_the_end_of_a_worker_waits_for_its_threads() -> None:
+    """Also for those of work that was dropped: none may run compiled code while the interpreter ends."""
+    worker = Worker()
+
+    def endless(progress: Progress) -> None:
+        while True:
+            time.sleep(0.01)
+            progress.tell(None, "")
+
+    before = threading.active_count()
+    for title in ("First", "Second", "Third"):
+        worker.begin(title, endless, print)
+    worker.close()
+    assert threading.active_count() == before and worker.status is None
 
 
 def solved(artist: Artist) -> None:

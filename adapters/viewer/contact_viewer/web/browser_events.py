@@ -1,7 +1,7 @@
 """What the browser tells, as events of the interaction.
 
-Pointer events come from trame-rca in pixels of the image from its lower left corner; keys come from the page's own
-listener, once each, and never from a text field.
+Pointer events come from trame-rca in the page's pixels, from the left and from below the last row: the pixel at the
+top has the height of the view as its y. Keys come from the page's own listener, once each, never from a text field.
 """
 
 from __future__ import annotations
@@ -23,8 +23,11 @@ _KEYS = {
 }
 
 
-def pointer_of(event: Mapping[str, Any], height: int, time: float) -> Pointer | None:
-    """The pointer event in one of trame-rca's; None for what is none. height: of the image, pixels."""
+def pointer_of(event: Mapping[str, Any], height: int, time: float, scale: float = 1.0) -> Pointer | None:
+    """The pointer event in one of trame-rca's; None for what is none, at the centre of the page's pixel.
+
+    height: of the image, in its own pixels, of which `scale` are one of the page's.
+    """
     kind, button = _kind(str(event.get("type", "")))
     if kind is None:
         return None
@@ -37,7 +40,8 @@ def pointer_of(event: Mapping[str, Any], height: int, time: float) -> Pointer | 
     if kind == "wheel":
         spin = _number(event.get("spinY")) or 0.0
         wheel = -max(-4.0, min(4.0, spin))
-    return Pointer(kind, x + 0.5, height - y - 0.5, button, _modifiers(event), time=time, wheel=wheel)
+    right, down = scale * (x + 0.5), height - scale * (y - 0.5)
+    return Pointer(kind, right, down, button, _modifiers(event), time=time, wheel=wheel)
 
 
 def key_of(event: Mapping[str, Any], time: float) -> Key | None:

@@ -49,8 +49,8 @@ class WebApplication:
 
     def run(self, port: int = 0) -> None:
         """Serve until interrupted. port: 0 for any that is free. Raises FileRefused for one that is taken."""
-        _check_port(port)
         try:
+            _check_port(port)
             self._server.start(
                 port=port, host=HOST, open_browser=False, show_connection_info=False, timeout=0, exec_mode="main"
             )

@@ -66,11 +66,7 @@ class Stream:
 
     def on_interaction(self, _: object, event: Mapping[str, Any]) -> None:
         """Something happened to the pointer."""
-        scaled = {
-            key: value * self._scale if key in ("x", "y") and isinstance(value, (int, float)) else value
-            for key, value in event.items()
-        }
-        pointer = pointer_of(scaled, self._app.canvas.eye.viewport[1], time.monotonic())
+        pointer = pointer_of(event, self._app.canvas.eye.viewport[1], time.monotonic(), self._scale)
         if pointer is not None and self._is_whole(pointer):
             self.put(pointer)
 

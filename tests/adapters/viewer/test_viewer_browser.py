@@ -1,0 +1,268 @@
+"""The application in a real browser: every operation by its mouse and keys, and what the document says of it.
+
+A twin of the application gets the same events without a browser: whatever lies between mouse and document, the two
+documents are the same after every gesture, and so are the pictures.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contact_core.document.document import ContactDocument
+from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.schema import document_to_json
+from contact_core.geometry.warm_up import warm_up
+from contact_core.interaction.events import Key, Pointer
+
+pytest.importorskip("vtkmodules")
+pytest.importorskip("trame_rca")
+pytest.importorskip("trame_vuetify")
+pytest.importorskip("PIL")
+
+from contact_viewer import panel
+from contact_viewer.files import open_files
+from contact_viewer.recovery import Recovery
+from tests.adapters.viewer.served import CHROMIUM, IMAGE, Page, Served, serving
+from tests.adapters.viewer.viewer_scenes import Sight, application
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A headless Chromium of this system, without the limit of memory that the tests have: it reserves more."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright (extra dev) drives the browser")
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium here: apt-get install chromium")
+    warm_up()
+    with api.sync_playwright() as playwright:
+        program = tmp_path_factory.mktemp("browser") / "chromium"
+        program.write_text(f'#!/bin/sh\nulimit -S -v unlimited\nexec {CHROMIUM} "$@"\n')
+        program.chmod(0o755)
+        made = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield made
+        made.close()
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with serving(tmp_path_factory.mktemp("served"), "sample:baseball") as made:
+        yield made
+
+
+@dataclass
+class Twins:
+    """Somebody at the browser, who looks at the twin to see where things are; both get every event.
+
+    script: what was done, and after each gesture the document.
+    """
+
+    page: Page
+    served: Served
+    sources: list[str]
+    sight: Sight
+    script: list[tuple[str, ContactDocument]] = field(default_factory=list)
+
+    def key(self, chord: str) -> None:
+        *held, name = chord.split("+")
+        self.sight.app.handle(Key(name, frozenset(each.lower() for each in held)))  # type: ignore[misc]
+        self.sight.app.frame()
+        plain = name.lower() if len(name) == 1 else name
+        self.page.key("+".join([*(each.replace("Ctrl", "Control") for each in held), plain]))
+
+    def drag(self, *pixels: Any, held: str = "") -> None:
+        """Press at the first pixel, over all others, let go at the last."""
+        whole = [np.floor(np.asarray(pixel, float)) for pixel in pixels]
+        modifiers: Any = frozenset({held} - {""})
+
+        def twin(kind: Any, pixel: Any, button: Any = "none") -> None:
+            self.sight.app.handle(Pointer(kind, pixel[0] + 0.5, pixel[1] + 0.5, button, modifiers))
+            self.sight.app.frame()
+
+        twin("move", whole[0])
+        twin("press", whole[0], "left")
+        for pixel in whole[1:]:
+            twin("move", pixel)
+        twin("release", whole[-1], "left")
+        if held:
+            self.page.page.keyboard.down(held.title())
+        self.page.drag_pixels(*whole)
+        if held:
+            self.page.page.keyboard.up(held.title())
+
+    def does(self, key: str, title: str, *pixels: Any, held: str = "") -> ContactDocument:
+        """A tool and a gesture: one step of that name, which is the same step in the browser."""
+        if key:
+            self.key(key)
+        revision = self.sight.app.session.revision
+        self.drag(*pixels, held=held)
+        app = self.sight.app
+        assert app.session.revision == revision + 1, (title, app.line(), app.refusal())
+        assert app.undo_name().startswith(title)
+        return self.agree(title)
+
+    def agree(self, title: str) -> ContactDocument:
+        """Wait for the step in the browser, and hold it against the twin's: contacts to the last bit, poses by how
+        far pairs are apart, since other frames take the hand other ways."""
+        app = self.sight.app
+        self.page.until(f"() => trame.state.get('undo_name') === {json.dumps(app.undo_name())}")
+        kept, wanted = Recovery(self.sources, self.served.folder / "state").found(), app.session.document
+        assert kept is not None and contacts(kept) == contacts(wanted), title
+        assert set(kept.poses) == set(wanted.poses)
+        assert self.gaps(kept) == pytest.approx(self.gaps(wanted), abs=1e-3)
+        self.script.append((title, kept))
+        return kept
+
+    def gaps(self, document: ContactDocument) -> list[float]:
+        """How far the pairs are apart in a document's poses, metres."""
+        desk, session = self.sight.app.interaction.desk, self.sight.app.session
+        scene = desk.scene.following(document, session.derived.known_meshes, session.rigs)
+        return [each.gap for each in panel.residuals(session, scene, document)]
+
+    def pictures(self) -> tuple[Any, Any]:
+        """The image that the page shows once it stands still, and what the twin draws: (h, w, 3) each, 0 to 1."""
+        from PIL import Image
+
+        self.page.page.mouse.move(2, 2)  # no brush, no handle under the pointer
+        self.sight.app.handle(Pointer("leave", 0.0, 0.0))
+        self.page.page.wait_for_timeout(800)
+        self.sight.app.frame()
+        seen = np.asarray(Image.open(io.BytesIO(self.page.image())).convert("RGB"), float)
+        return seen / 255.0, self.sight.app.canvas.image(still=True) / 255.0
+
+
+def contacts(document: ContactDocument) -> Any:
+    """A document without its poses, as JSON."""
+    return document_to_json(replace(document, poses=FrozenMap()))
+
+
+def by(pixel: Any, right: float, down: float) -> Any:
+    """(2,) a pixel so far from another."""
+    return np.asarray(pixel) + np.array([right, down])
+
+
+@pytest.mark.slow
+def test_the_whole_road_on_the_real_hand_and_bunny(browser: Any, assets: Path, tmp_path: Path) -> None:
+    """Paint, transfer, move, turn, bend, link, solve, undo, save, reload: event script, document, picture."""
+    files = ["rigs/webxr_generic_hand_left.glb", "objects/stanford_bunny_35k.obj"]
+    sources = [str(assets / each) for each in files]
+    with serving(tmp_path, *sources) as served:
+        page = Page.opened(browser, served.address)
+        app = application(sources, tmp_path / "twin", page.size())
+        sight = Sight(app)
+        twins = Twins(page, served, sources, sight)
+        twins.key("Home")
+        hand, bunny = app.session.document.surfaces
+        start = sight.on_joint(hand, "index-finger-phalanx-intermediate")
+        twins.does("B", "Paint", start, by(start, 1, 6), by(start, 2, 12))
+        middle = sight.on_thing(bunny)
+        twins.does("T", "Transfer", middle, by(middle, 8, -8), by(middle, 16, -20))
+        (copy,) = [patch.name for patch in app.session.document.patches.values() if patch.surface == bunny]
+        assert app.session.document.pairs and hand in app.session.document.poses
+        while app.interaction.selection.surface != bunny:  # through the hand, which lies over it
+            twins.key("Tab")
+        for key, title, share, path in (
+            ("G", "Translate", 0.5, ((8, 6), (15, 15))),
+            ("R", "Rotate", 0.9, ((8, 6), (15, 15))),
+            ("D", "Bend", 0.9, ((-8, 6), (-15, 8))),
+        ):
+            at = sight.on_patch(copy, share)
+            twins.does(key, title, at, *(by(at, *step) for step in path))
+        beside = sight.on_patch(copy, 0.0)
+        twins.does("B", "Paint", by(beside, -40, 40), by(beside, -30, 50), held="shift")
+        second = list(app.session.document.patches)[-1]
+        twins.does("K", "Link", sight.on_patch(second), sight.on_patch(copy))
+        before = app.session.document.poses[hand]
+        twins.key("Space")
+        page.until("() => trame.state.get('proposed')")
+        while app.interaction.worker.status is not None:
+            app.frame()
+            time.sleep(0.01)
+        twins.key("Enter")
+        solved = twins.agree("Solve")
+        assert np.abs(solved.poses[hand].local - before.local).max() > 1e-4
+        twins.key("Ctrl+Z")
+        twins.agree("Undo")
+        twins.key("Ctrl+Shift+Z")
+        twins.agree("Redo")
+        twins.key("Shift+R")  # the hand at rest: what is drawn is then the same
+        twins.agree("Rest pose")
+        seen, drawn = twins.pictures()
+        assert seen.shape == drawn.shape
+        assert np.abs(seen - drawn).mean() < 0.01 and (np.abs(seen - drawn).max(axis=2) > 0.25).mean() < 0.005
+        page.key("Control+s")
+        page.until("() => trame.state.get('line').includes('saved')")
+        patches = page.patches()
+        page.page.reload()
+        page.page.wait_for_selector(IMAGE, timeout=30_000)
+        page.until_patches(len(patches))  # the server goes on, and the page with it
+        assert page.patches() == patches == list(app.session.document.patches) and page.errors == []
+        page.page.close()
+        (saved,) = tmp_path.glob("*.contactscene")
+    with open_files([str(saved)], app.plugins) as again:
+        assert document_to_json(again.document) == document_to_json(twins.script[-1][1])
+    app.close()
+
+
+@pytest.mark.slow
+def test_a_killed_server_loses_no_stroke(browser: Any, tmp_path: Path) -> None:
+    with serving(tmp_path, "sample:baseball") as served:
+        page = Page.opened(browser, served.address)
+        page.key("b")
+        page.drag((0.5, 0.5), (0.54, 0.53))
+        page.until_patches(1)
+        served.process.kill()
+        page.page.close()
+    with serving(tmp_path, "sample:baseball") as served:
+        page = Page.opened(browser, served.address)
+        assert len(page.patches()) == 1 and "is back" in page.first_line
+        page.page.close()
+
+
+@pytest.mark.slow
+def test_a_dense_screen_is_drawn_and_picked_densely(browser: Any, served: Served) -> None:
+    """At two device pixels per pixel the image has twice as many, and a click meets what is under it."""
+    page = Page.opened(browser, served.address, scale=2.0)
+    page.until(
+        f"() => document.querySelector('{IMAGE}').naturalWidth > 1.8 * document.querySelector('{IMAGE}').width"
+    )
+    page.key("b")
+    page.drag((0.5, 0.5), (0.52, 0.49))
+    page.until_patches(1)
+    page.page.locator('.contact-row:has-text("contact")').click()
+    page.until("() => trame.state.get('tree').some((row) => row.kind === 'patch' && row.selected)")
+    page.key("Control+z")
+    page.until_patches(0)
+    page.page.locator("button[title='Keys (?)']").click()
+    page.page.wait_for_selector("text=Redo", timeout=10_000)
+    page.key("Escape")
+    page.until("() => !trame.state.get('help_wanted')")
+    assert page.errors == []
+    page.page.close()
+
+
+@pytest.mark.slow
+def test_keys_in_a_field_of_text_are_text(browser: Any, served: Served) -> None:
+    page = Page.opened(browser, served.address)
+    second = Page.opened(browser, served.address)
+    second.until("() => trame.state.get('pages') === 2")  # and both say so
+    second.page.close()
+    page.until("() => trame.state.get('pages') === 1")
+    before = page.state("tools")
+    page.page.locator("button[title='Open (Ctrl+O)']").click()
+    field = page.page.locator(".v-dialog input[type=text]").first
+    field.click()
+    page.page.keyboard.type("bgt none.glb")
+    page.page.wait_for_timeout(200)
+    assert page.state("tools") == before
+    page.page.locator("button:has-text('Add to the scene')").click()
+    page.until("() => trame.state.get('line').includes('none.glb')")
+    assert page.errors == []
+    page.page.close()
