@@ -196,7 +196,6 @@ READING = {
         "mesh_of",
         "axis",
         "root",
-        "unit",
         "reconstruction",
         "points",
         "root_at",
