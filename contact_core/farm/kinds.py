@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,10 +40,16 @@ class RecipeJob:
             return True
 
     def run(self, request: JobRequest, plugins: PluginManager, progress: Progress) -> JobOutcome:
-        """The job of `contact pose`; a frame or a solver of the batch's is refused: the recipe says both."""
-        from contact_core.job.run import run_recipe
+        """The job of `contact pose`, by the batch's solver where it names one."""
+        from contact_core.job.recipe_reader import load_recipe
+        from contact_core.job.run import run
 
-        result = run_recipe(request.path, request.folder, plugins=plugins, progress=progress)
+        if request.frames is not None:
+            raise InvalidInput("a recipe has no frames; leave --frames out, or give shots.")
+        recipe = load_recipe(request.path)
+        if request.solver is not None:
+            recipe = replace(recipe, solve=replace(recipe.solve, solver=request.solver))
+        result = run(recipe, request.folder, plugins=plugins, progress=progress)
         files = {role: path.name for role, path in result.files.items()}
         return JobOutcome(
             tuple(files.values()),

@@ -18,7 +18,7 @@ except ImportError as error:
 
 SUITES = (
     "host", "solver", "term", "axis_generator", "brush", "engine", "command", "format",
-    "grasp_sampler", "grasp_score", "tool",
+    "grasp_sampler", "grasp_score", "tool", "job_kind", "proxy_maker",
 )  # fmt: skip
 
 # Without this, an inherited test that fails prints a bare AssertionError instead of its values.

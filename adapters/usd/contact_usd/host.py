@@ -197,8 +197,10 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
             stack.enter_context(self._undo.writing("Document", storage.attributes(put, gone)))
             storage.write(self.layer, stamp, put, gone)
 
-    def save(self, path: Path | None = None) -> None:
-        stage_io.save(self._owned, stage_io.default_target(self._owned) if path is None else Path(path))
+    def save(self, path: Path | None = None, folder: Path | None = None) -> None:
+        """folder: where the file will be brought to, if it does not stay: relative paths in it start there."""
+        target = stage_io.default_target(self._owned) if path is None else Path(path)
+        stage_io.save(self._owned, target, folder)
 
     # Undo
 

@@ -9,6 +9,7 @@ from contact_core.plugins.slots import JobOutcome, JobRequest
 from contact_core.progress import Progress
 
 if TYPE_CHECKING:
+    from contact_core.geometry.mesh import TriangleMesh
     from contact_core.plugins.manager import PluginManager
     from contact_core.session import Session
 
@@ -26,6 +27,7 @@ class ShotJob:
 
     def run(self, request: JobRequest, plugins: PluginManager, progress: Progress) -> JobOutcome:
         """Solve and save. A surface whose asset has other triangles now is rebound, where it is known."""
+        from contact_core.atomic_set import replacing_set
         from contact_core.farm.kinds import check_finished
         from contact_core.farm.solved import THUMBNAIL, draw_solved, outcome_of
         from contact_usd import rebinding, shots
@@ -33,18 +35,24 @@ class ShotJob:
         layer = shots.contact_layer(request.path)
         name = f"{layer.stem.removesuffix('.contact')}.contact.usda"
         notes: list[str] = []
+        painted: dict[str, TriangleMesh] = {}
 
         def mend(shot: Session) -> None:
-            notes.extend(rebinding.rebind_changed(shot, request.folder / rebinding.KEPT))
+            moved, surfaces = rebinding.rebind_changed(shot, request.folder / rebinding.KEPT)
+            notes.extend(moved)
+            painted.update(surfaces)
 
         with shots.open_shot(layer, plugins=plugins, mend=mend) as shot:
             read = {str(layer), *(item.realPath for item in shot.host.stage.GetUsedLayers() if item.realPath)}
             frames = None if request.frames is None else list(request.frames)
-            part = progress.part(0.1, 0.8, "Solving")
-            proposal = shots.solve_open(shot, frames, request.solver, request.folder / name, part)
+            proposal = shots.solve_open(shot, frames, request.solver, progress.part(0.1, 0.8, "Solving"))
             check_finished(proposal.after.status.name)
-            picture = draw_solved(shot, proposal, request.folder / THUMBNAIL)
-            files = (name, rebinding.KEPT, *([picture] if picture else []))
+            names = (name, rebinding.KEPT, THUMBNAIL)
+            with replacing_set(request.folder, names) as stage:
+                shot.host.save(stage / name, request.folder)
+                rebinding.keep(stage / rebinding.KEPT, painted)
+                picture = draw_solved(shot, proposal, stage / THUMBNAIL)
+            files = names if picture is not None else names[:-1]
             inputs = tuple(map(Path, sorted(read)))
             return outcome_of(
                 proposal, files, frames=frames, picture=picture, notes=(*notes, *shot.notes), inputs=inputs

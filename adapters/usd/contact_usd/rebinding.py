@@ -22,12 +22,13 @@ from contact_core.session import Session
 KEPT = "surfaces.npz"
 
 
-def rebind_changed(session: Session, kept_file: Path) -> list[str]:
-    """Bind what is missing to the prim that it had, contacts projected onto its new triangles; notes on what moved.
+def rebind_changed(session: Session, kept_file: Path) -> tuple[list[str], Mapping[str, TriangleMesh]]:
+    """Bind what is missing to the prim that it had, contacts projected onto its new triangles.
 
-    kept_file: what an earlier call wrote; this one writes it anew, of the surfaces as the contacts were painted.
+    kept_file: what `keep` wrote beside earlier results. Returns notes on what moved, and the surfaces as the
+    contacts were painted, to be kept beside the new ones.
     """
-    kept, notes, painted = _read(kept_file), [], dict[str, TriangleMesh]()
+    kept, notes, painted = _read(kept_file), list[str](), dict[str, TriangleMesh]()
     remembered = session.document.extras.get(session.binding.key, {})
     for name in tuple(session.binding.missing):
         old = kept.get(session.document.surface(name).topology_digest)
@@ -41,8 +42,7 @@ def rebind_changed(session: Session, kept_file: Path) -> list[str]:
         painted[name] = old
     for name, found in session.binding.surfaces.items():
         painted.setdefault(name, found.asset.mesh)
-    _write(kept_file, painted)
-    return notes
+    return notes, painted
 
 
 def _rebind(session: Session, name: str, prim: str, old: TriangleMesh) -> str:
@@ -76,7 +76,8 @@ def _read(path: Path) -> Mapping[str, TriangleMesh]:
     return {mesh.topology_digest: mesh for mesh in meshes}
 
 
-def _write(path: Path, surfaces: Mapping[str, TriangleMesh]) -> None:
+def keep(path: Path, surfaces: Mapping[str, TriangleMesh]) -> None:
+    """Write surfaces for the next `rebind_changed`."""
     arrays: dict[str, FloatArray | IntArray] = {}
     for number, mesh in enumerate(surfaces.values()):
         arrays |= {f"points{number}": mesh.points, f"faces{number}": mesh.faces}

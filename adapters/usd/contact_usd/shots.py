@@ -156,16 +156,16 @@ def solve(
     with open_shot(contact_layer(path, None if out is None else out.parent), wanted, plugins) as shot:
         times: Sequence[float | None] = [None] if frames is None else frames
         try:
-            proposal = solve_open(shot, frames, solver, out, progress)
+            proposal = solve_open(shot, frames, solver, progress)
         except Cancelled:  # before the first frame
             return {"frames": [_frame_facts(frame, None) for frame in times]}
+        if proposal.after.status is not SolveStatus.CANCELLED:
+            shot.host.save(out)
         return {"frames": [_frame_facts(*known) for known in itertools.zip_longest(times, proposal.solutions)]}
 
 
-def solve_open(
-    shot: Session, frames: Sequence[float] | None, solver: str | None, out: Path | None, progress: Progress
-) -> Proposal:
-    """Solve an open shot, and unless that was cancelled accept and publish what came out and save it."""
+def solve_open(shot: Session, frames: Sequence[float] | None, solver: str | None, progress: Progress) -> Proposal:
+    """Solve an open shot, and unless that was cancelled accept and publish what came out; nothing is saved."""
     if not shot.document.pairs:
         raise InvalidInput("the shot has no contact pairs, so there is nothing to solve.")
     proposal = shot.solve(frames=frames, solver=solver, progress=progress)
@@ -173,7 +173,6 @@ def solve_open(
         with shot.host.step("Solve and key"):
             shot.accept(proposal)
             publish(shot, frames or ())
-        shot.host.save(out)
     return proposal
 
 

@@ -124,12 +124,13 @@ def default_target(owned: OwnedStage) -> Path:
     return owned.source if owned.ours else owned.source.with_name(f"{owned.source.stem}.contact.usda")
 
 
-def save(owned: OwnedStage, path: Path) -> None:
+def save(owned: OwnedStage, path: Path, folder: Path | None = None) -> None:
     """Write our layer to a file, its sublayers by relative paths. Raises FileRefused, never half a file.
 
-    Files that somebody named in our layer from its old folder are named from the new one.
+    Files that somebody named in our layer from its old folder are named from the new one. folder: where the file
+    will be brought to, if it does not stay.
     """
-    path = path.absolute()
+    written, path = path.absolute(), (path if folder is None else folder / path.name).absolute()
     if path.suffix.lower() not in WRITABLE:
         raise FileRefused(f"cannot write {path.name}: our layer is saved as one of {', '.join(WRITABLE)}.")
     used = {layer.realPath for layer in owned.stage.GetUsedLayers() if layer.realPath}
@@ -141,7 +142,7 @@ def save(owned: OwnedStage, path: Path) -> None:
     copy.TransferContent(owned.layer)
     UsdUtils.ModifyAssetPaths(copy, lambda asset: _relative(asset, path.parent) if asset in owned.beside else asset)
     copy.subLayerPaths = [_relative(item, path.parent) for item in copy.subLayerPaths]
-    with refusing(path), replacing(path) as temporary:
+    with refusing(path), replacing(written) as temporary:
         if not copy.Export(str(temporary)):
             raise OSError(f"USD could not write {temporary.name}")
 
