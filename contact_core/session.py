@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from contact_core.geometry.engine import GeodesicEngine
     from contact_core.plugins.manager import PluginManager
     from contact_core.proposals.proposal import Ghost
+    from contact_core.rig.pose_keys import PoseKeys
     from contact_core.rig.rig import Pose
     from contact_core.scene.binding import Binding
     from contact_core.scene.link import HostLink
@@ -300,13 +301,14 @@ class Session(GraspingSession):
         origin: str = "user",
         merge: bool = False,
         keys: Mapping[float, Mapping[str, Pose]] | None = None,
+        curves: Mapping[str, PoseKeys] | None = None,
     ) -> None:
         """Commit a command. It is in the journal when this returns.
 
         merge: where the command before agrees, both become one undo step; not inside a host with undo, whose own
-        steps cannot be joined: use a stroke there. keys: by frame, poses by surface that are keyed in the scene, in
-        the same undo step. Raises CommandRejected, or FileRefused when it cannot be recorded; then nothing has
-        changed.
+        steps cannot be joined: use a stroke there. keys: by frame, poses by surface that are keyed in the scene,
+        curves: by surface, cubic keys that it gets, in the same undo step. Raises CommandRejected, or FileRefused
+        when it cannot be recorded; then nothing has changed.
         """
         with self._open_edits.alone():
             self._check_writable()
@@ -314,7 +316,7 @@ class Session(GraspingSession):
             if self._open_edits.macro is not None:
                 self._open_edits.macro.do(command)
                 return
-            self._commit(command, origin, merge, keys)
+            self._commit(command, origin, merge, keys, curves)
 
     def _commit(
         self,
@@ -322,6 +324,7 @@ class Session(GraspingSession):
         origin: str = "user",
         merge: bool = False,
         keys: Mapping[float, Mapping[str, Pose]] | None = None,
+        curves: Mapping[str, PoseKeys] | None = None,
     ) -> None:
         """Do what `do` says of a command that keys what has tracks."""
         with self._open_edits.alone():
@@ -334,6 +337,8 @@ class Session(GraspingSession):
             with self._in_host(step.command.label(), before, step.after, step.revision):
                 for frame, poses in (keys or {}).items():
                     self.binding.write(poses, frame)
+                for name, found in (curves or {}).items():
+                    self.binding.write_curves(name, found)
                 if self._file is not None:
                     self._file.did(step)
                 self.history.commit(step)

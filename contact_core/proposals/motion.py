@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -42,6 +42,16 @@ if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
 
 PINNED = 2  # frames on either side of a range that run on as they are keyed
+
+
+class KeyedScene(Protocol):
+    """What a motion asks of a scene (`scene.binding.Binding`)."""
+
+    def pose_keys(self, name: str) -> tuple[float, ...]:
+        """Frames at which the rig of a surface is keyed already."""
+
+    def takes_curves(self, name: str) -> bool:
+        """Whether its keys are joined by cubic curves."""
 
 
 @dataclass(frozen=True)
@@ -88,15 +98,14 @@ def propose_motion(
     revision: int,
     settings: SolveSettings,
     motion: MotionSettings,
-    scene_keys: Callable[[str], tuple[float, ...]] | None = None,
+    scene: KeyedScene | None = None,
 ) -> MotionProposal:
     """The motion through frames. timed: the document with its tracks. frame: which one a ghost shows. draft_at: the
-    document at a frame, as the scene has it there. scene_keys: where the scene keys the rig of a surface already;
-    None without a scene, which then gets no keys.
+    document at a frame, as the scene has it there. scene: None without one, which then gets no keys.
 
     Raises InvalidInput without a pair of a rig that can be posed, Cancelled where nothing was solved.
     """
-    return _Motion(timed, frames, draft_at, plugins, settings, motion, scene_keys).proposal(frame, revision)
+    return _Motion(timed, frames, draft_at, plugins, settings, motion, scene).proposal(frame, revision)
 
 
 class _Motion:
@@ -110,9 +119,9 @@ class _Motion:
         plugins: PluginManager,
         settings: SolveSettings,
         motion: MotionSettings,
-        scene_keys: Callable[[str], tuple[float, ...]] | None,
+        scene: KeyedScene | None,
     ) -> None:
-        self.timed, self.draft_at, self.plugins, self.scene_keys = timed, draft_at, plugins, scene_keys
+        self.timed, self.draft_at, self.plugins, self.scene = timed, draft_at, plugins, scene
         self.settings, self.motion = settings, motion
         self.rate = timed.timeline.frames_per_second
         asked = sorted({float(frame) for frame in frames})
@@ -143,7 +152,8 @@ class _Motion:
             revision=revision,
             before=by_frame[-1],
             after=by_frame[-1],
-            keys={} if self.scene_keys is None else self._scene_keys(poses, self.scene_keys),
+            keys={} if self.scene is None else self._scene_keys(poses, self.scene),
+            curves={name: done.keys for name, done in cubic.items() if self._has_curves(name)},
             solutions=tuple(by_frame[row] for row, f in enumerate(self.frames) if self._is_asked(f)),
             motion=solution,
             reductions=cubic,
@@ -266,16 +276,17 @@ class _Motion:
             poses.append(box.pose(pose) if isinstance(box, EvaluatedRig) else pose)
         return tuple(poses)
 
-    def _scene_keys(
-        self, poses: Mapping[str, tuple[Pose, ...]], known: Callable[[str], tuple[float, ...]]
-    ) -> dict[float, dict[str, Pose]]:
-        """What the scene gets, by frame: the keys, and the pose at each key that it has within the range already,
-        or what lies between would stay as it was."""
+    def _has_curves(self, name: str) -> bool:
+        return self.scene is not None and self.scene.takes_curves(name)
+
+    def _scene_keys(self, poses: Mapping[str, tuple[Pose, ...]], scene: KeyedScene) -> dict[float, dict[str, Pose]]:
+        """What a scene of straight blends gets, by frame: the keys, and the pose at each key that it has within the
+        range already, or what lies between would stay as it was."""
         result: dict[float, dict[str, Pose]] = {}
-        for name in self.posed:
+        for name in (name for name in self.posed if not scene.takes_curves(name)):
             found = self._reduced(name, poses[name], "linear").keys
             solved = dict(zip(self.frames, poses[name], strict=True))
-            there = {f for f in known(name) if self.frames[0] <= f <= self.frames[-1]}
+            there = {f for f in scene.pose_keys(name) if self.frames[0] <= f <= self.frames[-1]}
             for frame in {*found.frames, *there}:
                 pose = solved[frame] if frame in solved else found.at(self.rigs[name], frame)
                 result.setdefault(frame, {})[name] = pose

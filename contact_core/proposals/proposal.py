@@ -22,6 +22,7 @@ from contact_core.proposals import PENALTY, REACH, ROUNDS, SLACK, TURN
 from contact_core.proposals.draft import Draft, change
 from contact_core.proposals.sliding import solve_sliding
 from contact_core.proposals.sliding_targets import SlidingPatch
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, world_from_surface
 from contact_core.solve.body import uniform_scale
@@ -41,13 +42,15 @@ class Ghost:
     """Something that is shown and not yet committed.
 
     command: what accepting commits. ghost: the document with it, which adapters show. revision: of the document
-    that it was made for. keys: by frame, the poses by surface that accepting keys in the scene.
+    that it was made for. keys: by frame, the poses by surface that accepting keys in the scene. curves: by surface,
+    cubic keys that it gets where it has curves.
     """
 
     command: Command
     ghost: ContactDocument
     revision: int
     keys: Mapping[float, Mapping[str, Pose]] = field(default_factory=dict, kw_only=True)
+    curves: Mapping[str, PoseKeys] = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)

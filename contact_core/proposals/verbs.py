@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from contact_core.proposals.draft import Draft
     from contact_core.proposals.motion import MotionSettings
     from contact_core.proposals.proposal import Ghost, Proposal, SolveSettings
+    from contact_core.rig.pose_keys import PoseKeys
     from contact_core.rig.rig import Pose, Rig
     from contact_core.scene.binding import Binding
     from contact_core.scene.problem import Objective
@@ -79,6 +80,7 @@ class ProposingSession(ABC):
         origin: str = "user",
         merge: bool = False,
         keys: Mapping[float, Mapping[str, Pose]] | None = None,
+        curves: Mapping[str, PoseKeys] | None = None,
     ) -> None:
         """Commit a command and key poses in the scene, as one undo step of document and scene."""
 
@@ -126,7 +128,7 @@ class ProposingSession(ABC):
         else:
             found = propose_motion(
                 self.timed_document, self.timeline.frame, frames, self._draft, self.plugins, self.revision,
-                settings, motion or MotionSettings(), self.binding.pose_keys if self.binding.has_scene else None,
+                settings, motion or MotionSettings(), self.binding if self.binding.has_scene else None,
             )  # fmt: skip
         self.show_ghost(found)
         return found
@@ -200,7 +202,7 @@ class ProposingSession(ABC):
         """
         if proposal.revision != self.revision:
             raise CommandRejected("the document has changed since this was proposed: propose again.")
-        self.do(proposal.command, keys=proposal.keys)
+        self.do(proposal.command, keys=proposal.keys, curves=proposal.curves)
 
     def dismiss(self, proposal: Ghost) -> None:
         """Take the ghost away; nothing was committed."""

@@ -18,9 +18,10 @@ from contact_core.document.asset import Asset
 from contact_core.document.document import ContactDocument, Surface
 from contact_core.edit.commands import SetExtra
 from contact_core.errors import CommandRejected, InvalidInput
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose, Rig
 from contact_core.scene.evaluated_rig import EvaluatingHost, HostRig, evaluated_by_host
-from contact_core.scene.host import HostAdapter, PoseWriting, RigReading, SceneObject, SceneReading
+from contact_core.scene.host import CurveWriting, HostAdapter, PoseWriting, RigReading, SceneObject, SceneReading
 
 PLACED_ALIKE = 1e-9  # world_from_surface entries that count as equal
 POSED_ALIKE = 2e-6  # of a rotation's entries, and of the rig's size: what single precision of hosts keeps
@@ -259,6 +260,17 @@ class Binding:
             if not isinstance(self._host, PoseWriting):
                 raise CommandRejected(f"the host {getattr(self._host, 'name', '')} cannot pose the rig {name!r}.")
             self._host.write_pose(found.object_id, pose, frame)
+
+    def takes_curves(self, name: str) -> bool:
+        """Whether the scene keys the rig behind a surface by cubic curves."""
+        found = self.surfaces.get(name)
+        return found is not None and found.rig is not None and isinstance(self._host, CurveWriting)
+
+    def write_curves(self, name: str, keys: PoseKeys) -> None:
+        """Key the rig behind a surface by curves, as `CurveWriting.write_curves`; nothing for what is not bound."""
+        found = self.surfaces.get(name)
+        if found is not None and isinstance(self._host, CurveWriting) and name not in self.missing:
+            self._host.write_curves(found.object_id, keys)
 
     def pose_keys(self, name: str) -> tuple[float, ...]:
         """Frames at which the scene keys the rig behind a surface."""

@@ -26,6 +26,7 @@ from contact_core.document.schema import VERSION
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.progress import Progress
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose
 from contact_core.scene.picture import Picture
 
@@ -156,6 +157,17 @@ class PoseWriting(HostAdapter, Protocol):
     @abstractmethod
     def pose_keys(self, object_id: str) -> tuple[float, ...]:
         """Frames with a key on any joint, ascending."""
+        ...
+
+
+@runtime_checkable
+class CurveWriting(PoseWriting, Protocol):
+    """Keys that cubic curves join."""
+
+    @abstractmethod
+    def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+        """Key the joints that cubic keys name by curves that move the skin as the keys do, in place of what these
+        joints are keyed from the first of them to the last. Keys outside, other joints and other channels stay."""
         ...
 
 

@@ -94,28 +94,30 @@ def _read_rotation(pose_bone: Any) -> FloatArray:
 
 def _write_rotation(pose_bone: Any, rotation: Rotation) -> str:
     """Set the rotation in the bone's mode; the channel's name."""
-    mode, channel = pose_bone.rotation_mode, rotation_channel(pose_bone)
+    channel = rotation_channel(pose_bone)
+    before = np.array(getattr(pose_bone, channel), float)
+    setattr(pose_bone, channel, near_angles(pose_bone.rotation_mode, rotation, before).tolist())
+    return channel
+
+
+def near_angles(mode: str, rotation: Rotation, before: FloatArray) -> FloatArray:
+    """(w,) a rotation as the channel of a mode has it, by the numbers nearest to those of before (w,)."""
     if mode == "QUATERNION":
         wxyz = rotation.as_quat()[[3, 0, 1, 2]]
-        sign = -1.0 if wxyz @ np.array(pose_bone.rotation_quaternion) < 0.0 else 1.0
-        pose_bone.rotation_quaternion = (sign * wxyz).tolist()
-    elif mode == "AXIS_ANGLE":
+        return np.asarray(-wxyz if wxyz @ before < 0.0 else wxyz)
+    if mode == "AXIS_ANGLE":
         vector = rotation.as_rotvec()
         angle = float(np.linalg.norm(vector))
         axis = vector / angle if angle > 0.0 else np.array([0.0, 1.0, 0.0])
-        before = np.array(pose_bone.rotation_axis_angle)
         sign = -1.0 if axis @ before[1:] < 0.0 else 1.0
         turns = round((before[0] - sign * angle) / (2.0 * np.pi))
-        pose_bone.rotation_axis_angle = (sign * angle + 2.0 * np.pi * turns, *(sign * axis))
-    else:
-        places = ["XYZ".index(axis) for axis in mode]
-        before = np.array(pose_bone.rotation_euler)[places]
-        angles = np.empty(3)
-        with warnings.catch_warnings():  # in gimbal lock any split of the two turns is right
-            warnings.simplefilter("ignore", UserWarning)
-            angles[places] = _near(rotation.as_euler(mode.lower()), before)
-        pose_bone.rotation_euler = angles.tolist()
-    return channel
+        return np.array([sign * angle + 2.0 * np.pi * turns, *(sign * axis)])
+    places = ["XYZ".index(axis) for axis in mode]
+    angles = np.empty(3)
+    with warnings.catch_warnings():  # in gimbal lock any split of the two turns is right
+        warnings.simplefilter("ignore", UserWarning)
+        angles[places] = _near(rotation.as_euler(mode.lower()), before[places])
+    return angles
 
 
 def _near(angles: FloatArray, before: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from contact_blender import compat, evaluation, exporter, fidelity, keys, poses, selection, storage
+from contact_blender import compat, curves, evaluation, exporter, fidelity, keys, poses, selection, storage
 from contact_blender import mesh as meshes
 from contact_blender import rig as rigs
 from contact_blender.compat import bpy
@@ -22,12 +22,13 @@ from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, FileRefused, InvalidInput
 from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose
 from contact_core.scene.host import (
+    CurveWriting,
     Display,
     DocumentStamp,
     DocumentStorage,
-    PoseWriting,
     ProgressDisplay,
     RigReading,
     SceneLifetime,
@@ -60,7 +61,7 @@ class BlenderHost(
     SceneReading,
     SceneWriting,
     RigReading,
-    PoseWriting,
+    CurveWriting,
     DocumentStorage,
     Undo,
     SceneLifetime,
@@ -185,17 +186,24 @@ class BlenderHost(
     def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
         check_frame(frame)
         _, armature, placement = self._rigged(object_id)
-        if armature.library is not None:
-            raise InvalidInput(
-                f"{armature.name} is linked from {armature.library.filepath}, so its pose would not be saved: make"
-                " a library override of it and pose that."
-            )
+        _check_local(armature)
         local = unstretch_pose(pose, placement.surface_from_local)
         armature_id = self._ids.id_of(armature)
         with self.step("Pose"):
             put_back = poses.remember(armature, pose.joints, frame)
             self._undo.wrote(lambda: put_back(self._ids.resolve(armature_id)))
             poses.write_pose(armature, local, frame)
+
+    def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+        _, armature, placement = self._rigged(object_id)
+        _check_local(armature)
+        rig = self.read_rig(object_id).rig
+        assert rig is not None
+        armature_id, joints = self._ids.id_of(armature), pose_keys.poses[0].joints
+        with self.step("Curves"):
+            put_back = poses.remember(armature, joints, pose_keys.frames[0])
+            self._undo.wrote(lambda: put_back(self._ids.resolve(armature_id)))
+            curves.write(armature, rig, pose_keys, placement.surface_from_local)
 
     def pose_keys(self, object_id: str) -> tuple[float, ...]:
         return keys.frames(self._rigged(object_id)[1])
@@ -343,6 +351,15 @@ class BlenderHost(
     def _placement(self, scene_object: Any, frame: float | None = None) -> PolarDecomposition:
         with evaluation.graph_at(frame, scene_object) as depsgraph:
             return split_world_from_local(np.array(scene_object.evaluated_get(depsgraph).matrix_world, float))
+
+
+def _check_local(armature: Any) -> None:
+    """Raises InvalidInput for one that another file holds."""
+    if armature.library is not None:
+        raise InvalidInput(
+            f"{armature.name} is linked from {armature.library.filepath}, so its pose would not be saved: make"
+            " a library override of it and pose that."
+        )
 
 
 def _open_file(source: Path) -> None:

@@ -55,7 +55,7 @@ def frames(armature: Any) -> tuple[float, ...]:
     found: set[float] = set()
     for curve in compat.fcurves(armature):
         if curve.data_path.startswith("pose.bones"):
-            found.update(np.round(_keys_of(curve)["co"].reshape(-1, 2)[:, 0].astype(float), 4).tolist())
+            found.update(np.round(keys_of(curve)["co"].reshape(-1, 2)[:, 0].astype(float), 4).tolist())
     return tuple(sorted(found))
 
 
@@ -64,7 +64,7 @@ def remember(armature: Any, bones: Collection[str]) -> Callable[[Any], None]:
     animation = armature.animation_data
     had_animation = animation is not None
     had_action = animation is not None and animation.action is not None
-    before = {_id(curve): _keys_of(curve) for curve in _curves(armature, bones)}
+    before = {_id(curve): keys_of(curve) for curve in _curves(armature, bones)}
 
     def restore(again: Any) -> None:
         if not had_action:
@@ -76,7 +76,7 @@ def remember(armature: Any, bones: Collection[str]) -> Callable[[Any], None]:
             return
         for curve in _curves(again, bones):
             if _id(curve) in before:
-                _put_keys(curve, before[_id(curve)])
+                put_keys(curve, before[_id(curve)])
             else:
                 compat.remove_fcurve(again, curve)
 
@@ -103,7 +103,7 @@ def _id(curve: Any) -> tuple[str, int]:
     return str(curve.data_path), int(curve.array_index)
 
 
-def _keys_of(curve: Any) -> dict[str, Any]:
+def keys_of(curve: Any) -> dict[str, Any]:
     """The keys of a curve as flat arrays by field."""
     points = curve.keyframe_points
     values = {name: np.empty(width * len(points), dtype) for name, (width, dtype) in _FIELDS.items()}
@@ -112,9 +112,9 @@ def _keys_of(curve: Any) -> dict[str, Any]:
     return values
 
 
-def _put_keys(curve: Any, wanted: dict[str, Any]) -> None:
+def put_keys(curve: Any, wanted: dict[str, Any]) -> None:
     """Give a curve exactly these keys."""
-    now = _keys_of(curve)
+    now = keys_of(curve)
     if all(np.array_equal(now[name], wanted[name]) for name in _FIELDS):
         return
     curve.keyframe_points.clear()
