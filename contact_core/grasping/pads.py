@@ -11,7 +11,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tracing import trace_geodesic
 from contact_core.grasping.features import features_of
 from contact_core.hands.description import Pad
-from contact_core.proposals.draft import RecordingDraft
+from contact_core.proposals.draft import Draft
 
 if TYPE_CHECKING:
     from contact_core.geometry.mesh import TriangleMesh
@@ -23,10 +23,10 @@ LARGEST, LEAST = 0.4, 0.4  # a pad's radius as a share of that, and of what the 
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
-def painted_pads(scene: GraspScene, at: FloatArray | None = None) -> tuple[RecordingDraft, tuple[str, ...], bool]:
+def painted_pads(scene: GraspScene, at: FloatArray | None = None) -> tuple[Draft, tuple[str, ...], bool]:
     """A draft with pads on the hand and none of its contacts with the object, their names, and whether they were
     only proposed: those may rightly touch nothing. at: (3,) the place that is to be held."""
-    draft = RecordingDraft(scene.document, scene.derived, scene.rigs, scene.evaluated)
+    draft = Draft(scene.document, scene.derived, scene.rigs, scene.evaluated)
     for pair in scene.document.pairs.values():
         ends = [scene.document.patch(end).surface for end in (pair.manipulator, pair.object)]
         if ends == [scene.hand_name, scene.object_name]:

@@ -42,7 +42,7 @@ from contact_core.grasping.verdict import Verdict, judge, judge_hold
 from contact_core.plugins.registry import GRASP_SAMPLERS, GRASP_SCORES, PLACERS, POSE_TERMS
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.progress import NO_PROGRESS, Progress
-from contact_core.proposals.draft import RecordingDraft
+from contact_core.proposals.draft import Draft
 from contact_core.proposals.proposal import AGAIN, Proposal, SolveSettings, settle
 from contact_core.rig.bones import bone_segments
 from contact_core.rig.rig import Pose, forward_kinematics, skin
@@ -297,7 +297,7 @@ def _alike(scene: GraspScene, one: Suggestion, other: Suggestion) -> bool:
 
 def _finished(
     scene: GraspScene,
-    base: RecordingDraft,
+    base: Draft,
     pads: tuple[str, ...],
     proposed: bool,
     approach: Approaches,
@@ -315,7 +315,7 @@ def _finished(
 
 def finished(
     scene: GraspScene,
-    draft: RecordingDraft,
+    draft: Draft,
     wanted: tuple[str, ...],
     proposed: bool,
     kind: Kind,
@@ -346,7 +346,7 @@ def finished(
     return judged(scene, draft, solution, kind, used, left_out, len(wanted), proposed, score)
 
 
-def _settled(scene: GraspScene, draft: RecordingDraft, whole: bool) -> PoseSolution:
+def _settled(scene: GraspScene, draft: Draft, whole: bool) -> PoseSolution:
     """Solve, contacts to where they then face the object, solve again; the better of both."""
     settings = scene.settings(whole)
     found = settle(draft.document, draft.copy(), scene.plugins, scene.revision, settings, rounds=1)
@@ -364,7 +364,7 @@ def _unfit(scene: GraspScene, solution: PoseSolution) -> dict[str, str]:
     }
 
 
-def _stands(scene: GraspScene, draft: RecordingDraft) -> tuple[FloatArray, TriangleMesh]:
+def _stands(scene: GraspScene, draft: Draft) -> tuple[FloatArray, TriangleMesh]:
     """(j, 4, 4) object_from_joint of the hand as a draft has it, and its posed skin in the object's space."""
     rig = scene.rig
     local = _local(rig, draft.document.poses[scene.hand_name])
@@ -388,7 +388,7 @@ def _taking_part(scene: GraspScene, approach: Approaches, pads: tuple[str, ...])
     )
 
 
-def _place(scene: GraspScene, draft: RecordingDraft, names: tuple[str, ...]) -> dict[str, str]:
+def _place(scene: GraspScene, draft: Draft, names: tuple[str, ...]) -> dict[str, str]:
     """Pads to their closest facing points on the object, paired; those left out, with the reason."""
     world = {name: world_from_surface(draft.document, name) for name in (scene.hand_name, scene.object_name)}
     request = PlacementRequest(
@@ -427,7 +427,7 @@ def hand_share(scene: GraspScene) -> float:
 
 
 def judged(
-    scene: GraspScene, draft: RecordingDraft, solution: PoseSolution, kind: Kind, used: BoolArray,
+    scene: GraspScene, draft: Draft, solution: PoseSolution, kind: Kind, used: BoolArray,
     left_out: dict[str, str], wanted: int, proposed: bool, score: GraspScore,
 ) -> Suggestion:  # fmt: skip
     """What a draft has made of a document, measured, judged and scored, as one step. As for `finished`; wanted: how
@@ -471,7 +471,7 @@ def judged(
         kind, metrics, metrics["closure"], comfort(hand, angles),
         clearance(hand, scene.field, placed, way), verdict.failures,
     )  # fmt: skip
-    command = Macro(f"{kind.capitalize()} grasp", tuple(draft.commands))
+    command = Macro(f"{kind.capitalize()} grasp", draft.commands)
     proposal = Proposal(
         command, draft.document, scene.revision, solution, solution, left_out, solutions=(solution,)
     )

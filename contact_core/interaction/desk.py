@@ -18,7 +18,7 @@ from contact_core.interaction.seen import Hit, SeenScene
 from contact_core.interaction.settings import InteractionSettings, Selection
 from contact_core.interaction.view import View
 from contact_core.plugins.registry import TOOLS, Slot
-from contact_core.proposals.draft import RecordingDraft
+from contact_core.proposals.draft import Draft
 from contact_core.solve.terms import PoseTerm
 
 if TYPE_CHECKING:
@@ -149,12 +149,12 @@ class Desk:
         if self._stroke is not None and self._stroke.command is not None:
             self._stroke.cancel()
 
-    def draft(self) -> RecordingDraft:
+    def draft(self) -> Draft:
         """A draft for several verbs, from the document at the press, for `preview`."""
         session = self.session
-        return RecordingDraft(self.stroke.document, session.derived, session.rigs, makers=session.makers)
+        return Draft(self.stroke.document, session.derived, session.rigs, makers=session.makers)
 
-    def preview(self, title: str, draft: RecordingDraft) -> None:
+    def preview(self, title: str, draft: Draft) -> None:
         """Preview what was done to a draft as one step. Raises CommandRejected."""
         self.stroke.do(Macro(title, draft.commands))
 

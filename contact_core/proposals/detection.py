@@ -12,7 +12,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.contact.point_sets import connected_parts
 from contact_core.document.document import ContactDocument
 from contact_core.document.timeline import Span
-from contact_core.edit.command import Command, Macro
+from contact_core.edit.command import Macro
 from contact_core.edit.commands import SetSpans
 from contact_core.edit.derived import Derived
 from contact_core.errors import InvalidInput
@@ -86,24 +86,11 @@ def detect(
     return made.proposal(frame, revision)
 
 
-class _Recorder(Draft):
-    """A draft that remembers what was done in it."""
-
-    def __init__(self, document: ContactDocument, derived: Derived, rigs: Mapping[str, Rig]) -> None:
-        super().__init__(document, derived, rigs)
-        self.commands: list[Command] = []
-
-    def do(self, command: Command, *, origin: str = "user") -> None:
-        """Take a command, and remember it."""
-        super().do(command, origin=origin)
-        self.commands.append(command)
-
-
 class _Made:
     """What accepting does, as it comes together."""
 
     def __init__(self, timed: ContactDocument, derived: Derived, rigs: Mapping[str, Rig]) -> None:
-        self.draft = _Recorder(timed, derived, rigs)
+        self.draft = Draft(timed, derived, rigs)
         self.start = timed
         self.found: list[FoundContact] = []
         self._painted: dict[tuple[str, str], tuple[str, int, int]] = {}  # patch, its centre and a vertex beside it
@@ -126,7 +113,7 @@ class _Made:
 
     def proposal(self, frame: float, revision: int) -> Detection:
         """All of it as one step."""
-        command = Macro("Detect contacts", tuple(self.draft.commands))
+        command = Macro("Detect contacts", self.draft.commands)
         ghost = self.draft.document.at(frame)
         order = sorted(self.found, key=lambda each: each.span.on)
         return Detection(command, ghost, revision, found=tuple(order))

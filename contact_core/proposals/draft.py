@@ -1,4 +1,4 @@
-"""A draft of a document: verbs work on it one after the other, and nothing is committed."""
+"""A draft of a document to pose: verbs and solvers work on it one after the other, and nothing is committed."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from contact_core.document.document import ContactDocument
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.edit.command import Command, Macro, apply_command
+from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import PlaceSurface, Settle
 from contact_core.edit.derived import Derived
-from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.edit.draft import DocumentDraft
 from contact_core.edit.editor import Makers
 from contact_core.edit.verbs import Pairs, Patches, Surfaces
 from contact_core.rig.rig import Rig
@@ -29,8 +29,8 @@ class _QuietPatches(Patches):
         pass
 
 
-class Draft:
-    """An editor of a document of its own. rigs: by surface. evaluated: those whose skin only the host evaluates."""
+class Draft(DocumentDraft):
+    """A draft whose rigs can be posed. evaluated: by surface, rigs whose skin only the host evaluates."""
 
     def __init__(
         self,
@@ -40,30 +40,15 @@ class Draft:
         evaluated: Mapping[str, HostRig] | None = None,
         makers: Makers | None = None,
     ) -> None:
-        self._document, self._derived = document, derived
-        self.rigs, self.evaluated = dict(rigs), dict(evaluated or {})
-        self.makers = makers or Makers()
-        self.geometry = DocumentGeometry(lambda: self._document, derived, self.rigs)
-        self.patches, self.pairs, self.surfaces = _QuietPatches(self), Pairs(self), Surfaces(self)
+        super().__init__(document, derived, rigs, makers)
+        self.evaluated = dict(evaluated or {})
+        self.patches, self.pairs, self.surfaces = Patches(self), Pairs(self), Surfaces(self)
 
-    @property
-    def document(self) -> ContactDocument:
-        """The document as the draft has it now."""
-        return self._document
-
-    @property
-    def timed_document(self) -> ContactDocument:
-        """The same: a draft is of one frame."""
-        return self._document
-
-    @property
-    def derived(self) -> Derived:
-        """Reconstructed geometry, cached."""
-        return self._derived
-
-    def do(self, command: Command, *, origin: str = "user") -> None:
-        """Take a command into the draft."""
-        self._document = apply_command(command, self._document)
+    def copy(self) -> Draft:
+        """Another that goes on from here."""
+        other = Draft(self.document, self.derived, self.rigs, self.evaluated, self.makers)
+        other.commands = self.commands
+        return other
 
     def problem(self, objective: Objective | None = None) -> PoseProblem:
         """The pose problem of the document as the draft has it now (`scene.problem.problem_of`)."""
@@ -73,22 +58,6 @@ class Draft:
         """Pose the rigs as a solution has them."""
         for name, pose in poses_of(solution, self.rigs).items():
             self.surfaces.set_pose(name, pose)
-
-
-class RecordingDraft(Draft):
-    """A draft that remembers what was done to it, so that all of it can be committed as one step."""
-
-    commands: tuple[Command, ...] = ()
-
-    def do(self, command: Command, *, origin: str = "user") -> None:
-        super().do(command, origin=origin)
-        self.commands = (*self.commands, command)
-
-    def copy(self) -> RecordingDraft:
-        """Another that goes on from here."""
-        other = RecordingDraft(self._document, self._derived, self.rigs, self.evaluated, self.makers)
-        other.commands = self.commands
-        return other
 
 
 def change(before: ContactDocument, after: ContactDocument, title: str) -> Command:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -16,10 +15,9 @@ from contact_core.contact.patch import parameterize_patch
 from contact_core.contact.placement import Link, Placement, Root
 from contact_core.contact.shape import PatchCoordinates
 from contact_core.document.document import ContactDocument
-from contact_core.edit.command import Command, apply_command
 from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.edit.draft import DocumentDraft
 from contact_core.edit.editor import Editor
-from contact_core.edit.open_macro import OpenMacro
 from contact_core.errors import InvalidInput, MissingExtra, NotManifold, Unreached
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
@@ -75,16 +73,16 @@ class VerbGroup:
     def _on_proxies(self, surfaces: list[str], act: Callable[[Self], T], error: InvalidInput) -> T:
         from contact_core.edit.verbs.surfaces import Surfaces
 
-        apart = EditorApart(self._editor)
+        draft = DocumentDraft.of(self._editor)
         try:
             for surface in surfaces:
-                Surfaces(apart).add_proxy(surface)
-            result = act(type(self)(apart))
+                Surfaces(draft).add_proxy(surface)
+            result = act(type(self)(draft))
         except MissingExtra as missing:
             raise type(error)(f"{error} {missing}") from error
         except InvalidInput:
             raise error from None  # a proxy is no cure: say what is wrong with the surface
-        command = apart.macro.end()
+        command = draft.command("Edit on a proxy")
         if command is not None:
             self._editor.do(command)
         return result
@@ -157,29 +155,3 @@ class VerbGroup:
     def _axis_from(self, patch: str, root: Root) -> Axis:
         """The axis that the patch would have at another root."""
         return reconstruct_axis(self._geometry.carrier_of(patch), self._document.surface_axis(patch), root)
-
-
-class EditorApart:
-    """An editor of the same surfaces whose commands become one command of another: `macro` holds them."""
-
-    def __init__(self, editor: Editor) -> None:
-        self.rigs, self.makers, self.derived = editor.rigs, editor.makers, editor.derived
-        self.macro = OpenMacro("Edit on a proxy", editor.timed_document)
-        self._shown, self._is_timed = editor.document, editor.document is not editor.timed_document
-        self.geometry = DocumentGeometry(lambda: self.document, editor.derived, editor.rigs)
-
-    @property
-    def document(self) -> ContactDocument:
-        """The document as the commands so far have it, at the frame of the other editor."""
-        return self._shown if self._is_timed else self.macro.document
-
-    @property
-    def timed_document(self) -> ContactDocument:
-        """The same with its tracks and spans."""
-        return self.macro.document
-
-    def do(self, command: Command, *, origin: str = "user") -> None:
-        """Keep a command. Raises CommandRejected."""
-        self.macro.do(command)
-        if self._is_timed:
-            self._shown = replace(apply_command(command, self._shown), tracks=self._shown.tracks)

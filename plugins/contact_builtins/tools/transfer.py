@@ -22,7 +22,7 @@ from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import NOTHING, Ghost, Overlay
 from contact_core.interaction.seen import Hit
 from contact_core.interaction.tool import Gesture
-from contact_core.proposals.draft import Draft, RecordingDraft
+from contact_core.proposals.draft import Draft
 from contact_core.settings import HasSettings, setting
 
 Mirrored: TypeAlias = Literal["auto", "yes", "no"]
@@ -122,7 +122,7 @@ class Transferring(Drag):
             return {"direction": end.positions(mesh)[0] - self.root.point.positions(mesh)[0]}
         return {} if heading is None else as_seen(shown, surface, Root.at(ends[0], heading))[1]
 
-    def _paired(self, draft: RecordingDraft, names: dict[str, str]) -> RecordingDraft:
+    def _paired(self, draft: Draft, names: dict[str, str]) -> Draft:
         if self.tool.pair and self.desk.document.patch(self.source).surface != self.root.surface:
             for name, copy in names.items():
                 draft.pairs.add(*in_order(draft.document, name, copy))
