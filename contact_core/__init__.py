@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from contact_core.errors import InvalidInput as InvalidInput
     from contact_core.geometry.mesh import TriangleMesh as TriangleMesh
     from contact_core.geometry.surface_point import SurfacePoints as SurfacePoints
+    from contact_core.library.shelf import Library as Library
     from contact_core.opening import new as new
     from contact_core.opening import open as open  # noqa: A004 - said as `contact.open`
     from contact_core.plugins import hookimpl as hookimpl
@@ -59,6 +60,7 @@ _HOME_OF_NAME = {
     "ContactError": "errors",
     "FileRefused": "errors",
     "InvalidInput": "errors",
+    "Library": "library.shelf",
     "Link": "contact.placement",
     "MemoryHost": "scene.memory_host",
     "Objective": "scene.problem",

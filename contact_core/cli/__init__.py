@@ -29,6 +29,7 @@ _OWN = (
     "contact_core.cli.motion:Motion",
     "contact_core.cli.batch:Batch",
     "contact_core.cli.grasp:Grasp",
+    "contact_core.cli.library:Library",
     "contact_core.cli.samples:Samples",
     "contact_core.cli.edits:History",
     "contact_core.cli.edits:Replay",

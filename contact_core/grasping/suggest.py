@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -122,7 +122,8 @@ class GraspSettings:
 
 @dataclass(frozen=True, eq=False)
 class GraspScene:
-    """The document, its hand and its object, and what solves there. hand_name, object_name: of their surfaces."""
+    """The document, its hand and its object, and what solves there. hand_name, object_name: of their surfaces.
+    prior: what draws the digits that touch nothing: the rig's rest, or the pose from which a solve starts."""
 
     document: ContactDocument
     derived: Derived
@@ -133,6 +134,7 @@ class GraspScene:
     plugins: PluginManager
     revision: int = 0
     evaluated: Mapping[str, HostRig] | None = None
+    prior: Literal["rest", "current"] = "rest"
 
     @property
     def rig(self) -> Rig:
@@ -192,7 +194,9 @@ class GraspScene:
         """
         rig = self.rig
         moving = [rig.joints[j] for j in {*np.flatnonzero(rig.parents < 0).tolist(), *self.hand.joints.tolist()}]
-        objective = Objective(self.terms(whole), free={self.hand_name: moving}, length=self.hand.length)
+        objective = Objective(
+            self.terms(whole), free={self.hand_name: moving}, prior=self.prior, length=self.hand.length
+        )
         return SolveSettings(objective=objective, options=SolveOptions(candidates=AGAIN, max_iterations=60))
 
 

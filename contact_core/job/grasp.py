@@ -93,7 +93,7 @@ def grasp(
             found.append(one)
         found.sort(key=lambda one: -one.score)
         seconds = {"first": round(first, 2), "all": round(time.perf_counter() - began, 2)}
-        return _written(job, scene, found, out, plugins, seconds, settings, progress)
+        return write_results(job, scene, found, out, plugins, seconds, settings, progress)
     except Cancelled as cancelled:
         raise Cancelled("the search for grasps was cancelled; nothing was written.") from cancelled
 
@@ -128,10 +128,11 @@ def _names(place: int) -> dict[str, str]:
     }
 
 
-def _written(
+def write_results(
     job: GraspJob, scene: GraspScene, found: Sequence[Suggestion], out: Path, plugins: PluginManager,
     seconds: dict[str, float], settings: GraspSettings, progress: Progress,
 ) -> GraspResult:  # fmt: skip
+    """Grasps of a job as files: sheet, report, and a document, a pose and a model for each. Raises FileRefused."""
     names = [SHEET, REPORT, *(name for k in range(64) for name in _names(k + 1).values())]
     with replacing_set(out, names) as stage:
         for place, one in enumerate(found):
