@@ -35,7 +35,7 @@ from contact_core.library.places import CANDIDATES, like_places
 from contact_core.library.record import PALM, Grasp, SavedPad
 from contact_core.plugins.registry import GRASP_SCORES
 from contact_core.progress import NO_PROGRESS, Progress
-from contact_core.proposals.draft import RecordingDraft
+from contact_core.proposals.draft import Draft
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, world_from_surface
 from contact_core.solve.solver import PoseSolution, SolveStatus
@@ -174,7 +174,7 @@ def _as_it_was(scene: GraspScene, grasp: Grasp, contacts: ContactSet, pose: Carr
     return judged(scene, draft, solution, grasp.kind, pose.used, {}, len(grasp.pads), True, score)
 
 
-def _unsolved(draft: RecordingDraft, scene: GraspScene) -> PoseSolution:
+def _unsolved(draft: Draft, scene: GraspScene) -> PoseSolution:
     """The pose that a draft has, as a solution: what was saved needs no solve."""
     problem = draft.problem(Objective(free={scene.hand_name: ()}, length=scene.hand.length))
     theta = problem.start
@@ -182,9 +182,9 @@ def _unsolved(draft: RecordingDraft, scene: GraspScene) -> PoseSolution:
     return PoseSolution("library", SolveStatus.NOTHING_FREE, problem, theta, value, value, (), 0, 0.0)
 
 
-def cleared(scene: GraspScene) -> RecordingDraft:
+def cleared(scene: GraspScene) -> Draft:
     """A draft without contacts between hand and object; the hand's patches stay."""
-    draft = RecordingDraft(scene.document, scene.derived, scene.rigs, scene.evaluated)
+    draft = Draft(scene.document, scene.derived, scene.rigs, scene.evaluated)
     for name in pairs_between(scene):
         target = draft.document.pairs[name].object
         draft.pairs.remove(name)
@@ -200,7 +200,7 @@ def contacts_name(contacts: ContactSet, digest: str) -> str:
     raise InvalidInput(f"the contacts {contacts.title!r} are not those of this grasp: they lie on other surfaces.")
 
 
-def imported(draft: RecordingDraft, contacts: ContactSet, onto: dict[str, str]) -> dict[str, str]:
+def imported(draft: Draft, contacts: ContactSet, onto: dict[str, str]) -> dict[str, str]:
     """Bring the patches of a set that lie on the surfaces of `onto`, with their pairs; by their name in the set the
     name that they have. A patch that is there already, the very same, is not brought again."""
     document = draft.document
@@ -256,7 +256,7 @@ def _is_same(
 
 def with_pads(
     scene: GraspScene, grasp: Grasp, contacts: ContactSet
-) -> tuple[RecordingDraft, tuple[str, ...], dict[str, str]]:
+) -> tuple[Draft, tuple[str, ...], dict[str, str]]:
     """A draft with the patches of the grasp on the scene's hand, their names, and why others were left out."""
     draft = cleared(scene)
     home = contacts_name(contacts, grasp.hand.digest)
@@ -298,7 +298,7 @@ def scaled(shape: PatchShape, factor: float) -> PatchShape:
 
 
 def _seat(
-    draft: RecordingDraft, scene: GraspScene, pad: SavedPad, shape: PatchShape, ratio: float, flip: bool
+    draft: Draft, scene: GraspScene, pad: SavedPad, shape: PatchShape, ratio: float, flip: bool
 ) -> tuple[Root, PatchShape]:
     """Where the axis of a pad begins on another hand, and its shape as large as the digit there is thick. ratio: of
     the lengths of the hands. Raises InvalidInput where the hand has no such digit or no skin there."""
