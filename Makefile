@@ -13,7 +13,7 @@ READY := $(VENV)/.ready
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo gallery test explore test-blender-all blender-extension lint typecheck pytest wheel matrix bench docs contract-report clean
+.PHONY: help demo gallery test explore test-blender-all test-blender-window blender-extension lint typecheck pytest wheel matrix bench docs contract-report clean
 
 help:
 	@echo "make demo | test | lint | bench | docs | clean"
@@ -55,6 +55,10 @@ explore: $(READY)
 # Blender 4.5 LTS, 5.0 and 5.2, each in an environment of its own (make test has 5.0 already).
 test-blender-all: $(READY)
 	$(BIN)/python adapters/blender/run_tests.py --all
+
+# A Blender with a window (CONTACT_BLENDER, else `blender`), under Xvfb, with mouse and keys; skips where there is none.
+test-blender-window: $(READY)
+	$(BIN)/pytest -q -rs tests/adapters/blender_window
 
 # The zip that an artist installs, for this platform; BLENDER_PYTHON=3.13 for Blender 5.1 and later.
 BLENDER_PYTHON ?= 3.11

@@ -26,8 +26,16 @@ PACKAGES = {
     "contact_builtins": REPOSITORY / "plugins" / "contact_builtins",
     "contact_blender": REPOSITORY / "adapters" / "blender" / "contact_blender",
 }
-BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}  # the first version, and the first no more
-NUMPY = {"3.11": "numpy==1.26.4", "3.13": "numpy>=2,<3"}  # as in those Blenders: wheels must fit it
+BLENDERS = {
+    "3.11": ("4.2.0", "5.1.0"),
+    "3.13": ("5.1.0", None),
+    "3.14": ("5.1.0", None),
+}  # the first version, and the first no more
+NUMPY = {
+    "3.11": "numpy==1.26.4",
+    "3.13": "numpy>=2,<3",
+    "3.14": "numpy>=2,<3",
+}  # as in those Blenders: wheels must fit it
 PLATFORMS = {
     ("Linux", "x86_64"): "linux-x64",
     ("Windows", "AMD64"): "windows-x64",
@@ -135,7 +143,7 @@ def download(folder: Path, python: str) -> list[Path]:
 def build(target: Path, wheels: Iterable[Path], python: str) -> Path:
     """Write the zip, the same bytes for the same content. Raises NotBuilt for a manifest with mistakes."""
     wheels = list(wheels)
-    files = {f"vendor/{name}": data for name, data in _vendored()}
+    files = {f"vendor/{name}": data for name, data in vendored()}
     files["__init__.py"], files["NOTICE"] = ENTRY.encode(), NOTICE.encode()
     files["LICENSE"] = (REPOSITORY / "LICENSE").read_bytes()
     files |= {f"wheels/{path.name}": path.read_bytes() for path in wheels}
@@ -154,7 +162,7 @@ def build(target: Path, wheels: Iterable[Path], python: str) -> Path:
     return target
 
 
-def _vendored() -> Iterable[tuple[str, bytes]]:
+def vendored() -> Iterable[tuple[str, bytes]]:
     """Our packages, with the metadata by which their plugins are found."""
     for name, folder in PACKAGES.items():
         for path in sorted(folder.rglob("*")):

@@ -239,8 +239,8 @@ def test_selecting_the_vertices_of_a_patch(bpy: Any, shared: Any) -> None:
 
 
 class Layout:
-    """What a panel draws into, for Blender has none without a window: texts are kept, and operators and properties
-    have to be registered ones."""
+    """What a panel draws into, for Blender has none without a window (tests/adapters/blender_window has the real
+    one): texts are kept, and operators, lists and properties have to be registered ones."""
 
     def __init__(self, bpy: Any, texts: list[str]) -> None:
         self.bpy, self.texts, self.enabled = bpy, texts, True
@@ -250,17 +250,38 @@ class Layout:
 
     box = column = row
 
+    def split(self, factor: float) -> Layout:
+        return self.row()
+
+    def separator(self, factor: float = 1.0) -> None:
+        pass
+
     def label(self, text: str, icon: str = "NONE") -> None:
-        assert icon in self.bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
+        self.known(icon)
         self.texts.append(text)
 
-    def prop(self, data: Any, name: str, text: str | None = None) -> None:
-        assert name in data.bl_rna.properties
+    def known(self, icon: str) -> None:
+        assert icon in self.bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
 
-    def prop_search(self, data: Any, name: str, searched: Any, rows: str) -> None:
+    def prop(self, data: Any, name: str, text: str | None = None, emboss: bool = True) -> None:
+        assert name in data.bl_rna.properties
+        if name == "label":
+            self.texts.append(data.label)
+
+    def prop_search(
+        self, data: Any, name: str, searched: Any, rows: str, text: str = "", icon: str = "NONE"
+    ) -> None:
+        self.known(icon)
         assert name in data.bl_rna.properties and rows in searched.bl_rna.properties
 
-    def operator(self, name: str, text: str = "") -> Any:
+    def template_list(self, kind: str, _: str, data: Any, shown: str, active: Any, row: str, rows: int) -> None:
+        listed = getattr(self.bpy.types, kind)
+        assert row in active.bl_rna.properties
+        for item in getattr(data, shown):
+            listed.draw_item(None, self.bpy.context, self, data, item, 0, active, row)
+
+    def operator(self, name: str, text: str = "", icon: str = "NONE") -> Any:
+        self.known(icon)
         known = getattr(self.bpy.ops.contact, name.removeprefix("contact.")).get_rna_type().properties
 
         class Given:
@@ -271,30 +292,46 @@ class Layout:
 
 
 def drawn(bpy: Any) -> list[str]:
-    """The texts of the panel as it is now."""
+    """The texts of the panels as they are now."""
     from types import SimpleNamespace
 
     from contact_blender.extension import panel
 
     texts: list[str] = []
-    panel.CONTACT_PT_contacts.draw(SimpleNamespace(layout=Layout(bpy, texts)), bpy.context)
+    for kind in panel.PANELS:
+        if issubclass(kind, bpy.types.Panel) and getattr(kind, "poll", lambda _: True)(bpy.context):
+            kind.draw(SimpleNamespace(layout=Layout(bpy, texts)), bpy.context)
     return texts
 
 
 def test_the_panel_shows_what_there_is(bpy: Any, hand: Any) -> None:
-    from contact_blender.extension import shared
+    from contact_blender.extension import panel, shared
 
-    names = list(hand.document.pairs)
+    names, scene = list(hand.document.pairs), bpy.context.scene
     assert drawn(bpy).count("not solved") == len(names) == 2
     bpy.ops.contact.solve()
+    near = {panel.nearness(name, scene) for name in names}
+    assert all(told.endswith("mm") for told in near) and near < set(drawn(bpy))
+    assert set(hand.document.patches) < set(drawn(bpy))
+    scene.unit_settings.system = "NONE"
     kept = shared.held()
     assert kept is not None
-    assert {f"within {kept.residuals[name]:.3g}" for name in names} < set(drawn(bpy))
-    assert set(hand.document.patches) | {"Pairs"} < set(drawn(bpy))
+    assert panel.nearness(names[0], scene) == f"{kept.residuals[names[0]]:.3g}"
     bpy.ops.contact.rotate(patch=next(iter(hand.document.patches)), angle=0.1)
-    assert "Pairs (edited since the last solve)" in drawn(bpy)
+    assert panel.nearness(names[0], scene).endswith(" ?")  # edited since the solve
     shared.close_all()
     assert drawn(bpy) == []  # nothing was begun: a button that shows what the scene holds
+
+
+def test_rows_of_the_lists_are_patches_and_pairs(bpy: Any, hand: Any) -> None:
+    settings, patches, pairs = bpy.context.window_manager.contact, hand.document.patches, hand.document.pairs
+    assert [row.label for row in settings.rows] == list(patches) and len(settings.pairs) == len(pairs) == 2
+    settings.row, settings.pair_row = 1, 0
+    assert settings.patch == list(patches)[1] and settings.pair == next(iter(pairs))
+    bpy.ops.contact.rename(name="other")  # the active one
+    assert settings.row == 1 and settings.rows[1].label == "other"
+    one_step(bpy, hand, lambda: bpy.ops.contact.recolor(patch="other", color=(0.0, 0.5, 1.0)))
+    assert tuple(settings.rows[1].color) == pytest.approx((0.0, 0.5, 1.0))
 
 
 @pytest.fixture

@@ -27,6 +27,7 @@ def register(package: str = __name__) -> None:
 
 def unregister() -> None:
     """Take everything out of Blender again, and close the sessions; their contacts stay in the scenes."""
+    panel.stop_waiting()
     shared.close_all()
     if hasattr(bpy.types.WindowManager, "contact"):
         del bpy.types.WindowManager.contact

@@ -285,6 +285,22 @@ def rename(session: Any, context: Any, given: Any) -> str:
 
 
 @operator(
+    "recolor",
+    "Recolour Patch",
+    "patch",
+    patch=PATCH,
+    color=FloatVectorProperty(name="Colour", subtype="COLOR", min=0.0, max=1.0, default=(0.9, 0.4, 0.3)),
+)
+def recolor(session: Any, context: Any, given: Any) -> str:
+    """Give a patch another colour."""
+    from contact_blender.extension import where
+
+    patch = where.patch_of(session, context, given.patch)
+    session.patches.recolor(patch, tuple(given.color))
+    return f"{patch} has another colour."
+
+
+@operator(
     "solve",
     "Solve Pose",
     "pair",

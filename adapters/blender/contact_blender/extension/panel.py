@@ -1,7 +1,12 @@
-"""The panel "Contact" in the sidebar of the 3D view. Drawing reads what is kept and computes nothing."""
+"""The tab "Contact" in the sidebar of the 3D view. Drawing reads what is kept and computes nothing.
+
+A row that is renamed or recoloured in a list calls its operator a moment later: the rows are made anew by that, and
+Blender still holds the row while it tells of the change.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -9,125 +14,303 @@ import bpy
 from contact_blender.extension import shared
 
 _Group = bpy.types.PropertyGroup
+_SETTLED = 0.4  # seconds without a change after which a colour that is being picked is taken
 
 
-def _settings(name: str, properties: dict[str, Any]) -> Any:
-    return type(name, (_Group,), {"__annotations__": properties, "__module__": __name__})
+def _settings(name: str, properties: dict[str, Any], **functions: Any) -> Any:
+    return type(name, (_Group,), {"__annotations__": properties, "__module__": __name__, **functions})
+
+
+# Changes of rows, told to operators
+
+
+def _renamed(row: Any, context: Any) -> None:
+    if not shared.is_listing() and row.label != row.name:
+        old, new = row.name, row.label
+        _later(lambda: bpy.ops.contact.rename(patch=old, name=new), 0.0)
+
+
+def _recolored(row: Any, context: Any) -> None:
+    if not shared.is_listing():
+        name, color = row.name, tuple(row.color)
+        _later(lambda: bpy.ops.contact.recolor(patch=name, color=color), _SETTLED)
+
+
+_waiting: list[Callable[[], None]] = []
+
+
+def _later(act: Callable[[], Any], seconds: float) -> None:
+    """Run an operator when Blender has let go of the row; of several changes the last counts."""
+    stop_waiting()
+
+    def run() -> None:
+        _waiting.clear()
+        manager = bpy.context.window_manager
+        try:
+            with bpy.context.temp_override(window=manager.windows[0]):
+                act()
+        except RuntimeError as error:  # how Blender hands on what an operator reports
+            said = str(error).removeprefix("Error: ").strip()
+            manager.popup_menu(lambda menu, _: menu.layout.label(text=said), title="Contact", icon="ERROR")
+            shared.list_patches()  # the row says again what is true
+
+    _waiting.append(run)
+    bpy.app.timers.register(run, first_interval=seconds)
+
+
+def stop_waiting() -> None:
+    """Forget what was about to be told."""
+    for run in _waiting:
+        if bpy.app.timers.is_registered(run):
+            bpy.app.timers.unregister(run)
+    _waiting.clear()
+
+
+def _row_of(rows: str, active: str) -> Any:
+    """An index for a list of Blender, of which the name is what is kept."""
+
+    def read(settings: Any) -> int:
+        names = [row.name for row in getattr(settings, rows)]
+        name = getattr(settings, active)
+        return names.index(name) if name in names else -1
+
+    def write(settings: Any, index: int) -> None:
+        there = getattr(settings, rows)
+        if 0 <= index < len(there):
+            setattr(settings, active, there[index].name)
+
+    return bpy.props.IntProperty(get=read, set=write, options={"HIDDEN"})
 
 
 Row = _settings(
     "ContactRow",
-    {"pair": bpy.props.StringProperty(), "color": bpy.props.FloatVectorProperty(subtype="COLOR", min=0.0, max=1.0)},
+    {
+        "label": bpy.props.StringProperty(name="Name", description="Double-click to rename", update=_renamed),
+        "pair": bpy.props.StringProperty(),
+        "color": bpy.props.FloatVectorProperty(
+            name="Colour",
+            description="The colour of the patch",
+            subtype="COLOR",
+            min=0.0,
+            max=1.0,
+            update=_recolored,
+        ),
+    },
 )
+PairRow = _settings("ContactPairRow", {"ends": bpy.props.StringProperty()})
 ContactSettings = _settings(
     "ContactSettings",
     {
         "patch": bpy.props.StringProperty(name="Patch", description="The active patch"),
-        "other": bpy.props.StringProperty(name="Other", description="The patch to pair with or to link to"),
+        "other": bpy.props.StringProperty(
+            name="Other Patch", description="The patch that the active one is paired with or linked to"
+        ),
+        "pair": bpy.props.StringProperty(name="Pair", description="The active pair"),
         "name": bpy.props.StringProperty(name="New name"),
-        "angle": bpy.props.FloatProperty(name="Angle", subtype="ANGLE", default=0.2617993877991494),
-        "along": bpy.props.FloatProperty(name="Along", default=1.0, min=0.001),
-        "spread": bpy.props.FloatProperty(name="Across", default=1.0, min=0.001),
-        "penetration": bpy.props.BoolProperty(name="Keep skin out of what is solid", default=True),
-        "keyed": bpy.props.BoolProperty(name="Key the scene's frames", default=False),
+        "angle": bpy.props.FloatProperty(
+            name="Angle", description="How far to turn or to bend", subtype="ANGLE", default=0.2617993877991494
+        ),
+        "along": bpy.props.FloatProperty(
+            name="Along", description="Size along the axis; 1 is as painted", default=1.0, min=0.001, soft_max=3.0
+        ),
+        "spread": bpy.props.FloatProperty(
+            name="Across", description="Size across the axis; 1 is as painted", default=1.0, min=0.001, soft_max=3.0
+        ),
+        "penetration": bpy.props.BoolProperty(
+            name="No Penetration", description="Keep skin out of what is solid", default=True
+        ),
+        "keyed": bpy.props.BoolProperty(
+            name="Key All Frames", description="Solve every frame of the scene's range and key it", default=False
+        ),
         "rows": bpy.props.CollectionProperty(type=Row),
+        "pairs": bpy.props.CollectionProperty(type=PairRow),
+        "row": _row_of("rows", "patch"),
+        "pair_row": _row_of("pairs", "pair"),
     },
 )
 
 
 def groups() -> tuple[Any, ...]:
     """The property groups, in the order of registering."""
-    return Row, ContactSettings
+    return Row, PairRow, ContactSettings
 
 
-class CONTACT_PT_contacts(bpy.types.Panel):  # noqa: N801 (Blender's spelling)
-    """Surfaces, patches and pairs, and what can be done with them."""
+class CONTACT_UL_patches(bpy.types.UIList):  # noqa: N801 (Blender's spelling)
+    """Patches: colour, name, and whether one is paired."""
 
-    bl_label = "Contact"
+    def draw_item(
+        self, context: Any, layout: Any, data: Any, item: Any, icon: Any, owner: Any, active: Any
+    ) -> None:
+        row = layout.row(align=True)
+        swatch = row.row()
+        swatch.ui_units_x = 1.0
+        swatch.prop(item, "color", text="")
+        row.prop(item, "label", text="", emboss=False)
+        row.label(text="", icon="LINKED" if item.pair else "BLANK1")
+
+
+class CONTACT_UL_pairs(bpy.types.UIList):  # noqa: N801
+    """Pairs: what touches what, and how near it came."""
+
+    def draw_item(
+        self, context: Any, layout: Any, data: Any, item: Any, icon: Any, owner: Any, active: Any
+    ) -> None:
+        split = layout.split(factor=0.68)
+        split.label(text=item.ends, icon="LINKED")
+        near = split.row()
+        near.alignment = "RIGHT"
+        near.label(text=nearness(item.name, context.scene))
+
+
+def nearness(pair: str, scene: Any) -> str:
+    """How near 95 % of a pair's points came, in the scene's unit of length; a question mark after a later edit."""
+    found = shared.held()
+    value = None if found is None else found.residuals.get(pair)
+    if found is None or value is None:
+        return "not solved"
+    units = scene.unit_settings
+    if units.system == "NONE":
+        told = f"{value:.3g}"
+    else:
+        told = bpy.utils.units.to_string(units.system, "LENGTH", value * units.scale_length, precision=3)
+    return told if found.solved == found.session.revision else f"{told} ?"
+
+
+class _InSidebar:
+    """Where the panels are."""
+
     bl_category = "Contact"
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
 
+
+class _OfPatches(_InSidebar):
+    """A panel that is there as soon as there is a patch."""
+
+    bl_parent_id = "CONTACT_PT_contacts"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        found = shared.held()
+        return found is not None and bool(found.session.document.patches)
+
+
+class CONTACT_PT_contacts(_InSidebar, bpy.types.Panel):  # noqa: N801
+    """Surfaces and patches."""
+
+    bl_label = "Contact"
+
     def draw(self, context: Any) -> None:
         layout, gone, found = self.layout, shared.missing(), shared.held()
         if gone:
-            layout.label(text="A library is missing: see the add-on's preferences", icon="ERROR")
+            layout.label(text="A library is missing:", icon="ERROR")
+            layout.label(text="see the add-on's preferences")
             return
-        if found is None:
-            if shared.is_stored():
-                layout.operator("contact.begin")
-            _draw_painting(layout)
+        if found is None and shared.is_stored():
+            layout.operator("contact.begin", icon="FILE_REFRESH")
             return
-        settings, document = context.window_manager.contact, found.session.document
-        layout.label(text=f"Surfaces: {', '.join(document.surfaces) or 'none yet'}")
-        _draw_painting(layout)
-        _draw_patches(layout, settings, document)
-        if document.patches:
-            _draw_editing(layout, settings)
-        if document.pairs:
-            _draw_pairs(layout, settings, found, context.scene)
+        if found is None or not found.session.document.patches:
+            _draw_start(layout)
+        else:
+            _draw_patches(layout, context.window_manager.contact, found.session.document)
 
 
-PANELS = (CONTACT_PT_contacts,)
+class CONTACT_PT_shape(_OfPatches, bpy.types.Panel):  # noqa: N801
+    """Where the active patch lies, and its shape."""
+
+    bl_label = "Edit Patch"
+
+    def draw(self, context: Any) -> None:
+        layout, settings = self.layout, context.window_manager.contact
+        row = layout.row(align=True)
+        row.operator("contact.transfer", icon="PASTEDOWN")
+        row.operator("contact.translate")
+        column = layout.column(align=True)
+        column.prop(settings, "angle")
+        row = column.row(align=True)
+        row.operator("contact.rotate").angle = settings.angle
+        row.operator("contact.bend").angle = settings.angle
+        column = layout.column(align=True)
+        row = column.row(align=True)
+        row.prop(settings, "along")
+        row.prop(settings, "spread")
+        scale = column.operator("contact.scale")
+        scale.along, scale.spread = settings.along, settings.spread
 
 
-def _draw_painting(layout: Any) -> None:
-    layout.operator("contact.add_surfaces")
-    layout.operator("contact.paint")
+class CONTACT_PT_pairs(_OfPatches, bpy.types.Panel):  # noqa: N801
+    """What touches what, and what follows what."""
+
+    bl_label = "Pairs and Links"
+
+    def draw(self, context: Any) -> None:
+        layout, settings = self.layout, context.window_manager.contact
+        if len(settings.pairs):
+            layout.template_list("CONTACT_UL_pairs", "", settings, "pairs", settings, "pair_row", rows=2)
+        layout.prop_search(settings, "other", settings, "rows", text="Other", icon="MESH_GRID")
+        column = layout.column(align=True)
+        row = column.row(align=True)
+        row.operator("contact.pair", icon="LINKED").other = settings.other
+        row.operator("contact.unpair", icon="UNLINKED").pair = settings.pair
+        row = column.row(align=True)
+        row.operator("contact.link", icon="CON_CHILDOF").parent = settings.other
+        row.operator("contact.unlink")
+
+
+class CONTACT_PT_pose(_OfPatches, bpy.types.Panel):  # noqa: N801
+    """The pose in which the pairs touch."""
+
+    bl_label = "Pose"
+
+    def draw(self, context: Any) -> None:
+        layout, settings, scene = self.layout, context.window_manager.contact, context.scene
+        column = layout.column()
+        column.prop(settings, "penetration")
+        column.prop(settings, "keyed")
+        large = layout.row()
+        large.scale_y = 1.4
+        solve = large.operator("contact.solve", icon="POSE_HLT")
+        solve.penetration, solve.keyed = settings.penetration, settings.keyed
+        solve.first, solve.last = scene.frame_start, scene.frame_end
+        column = layout.column(align=True)
+        row = column.row(align=True)
+        row.operator("contact.settle", text="Settle")
+        row.operator("contact.slide", text="Slide")
+        column.operator("contact.clear_pose", icon="LOOP_BACK")
+
+
+PANELS = (
+    CONTACT_UL_patches,
+    CONTACT_UL_pairs,
+    CONTACT_PT_contacts,
+    CONTACT_PT_shape,
+    CONTACT_PT_pairs,
+    CONTACT_PT_pose,
+)
+
+
+def _draw_start(layout: Any) -> None:
+    """What to do first."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    column.label(text="Select vertices in Edit Mode,", icon="INFO")
+    column.label(text="leave it (Tab), and paint:", icon="BLANK1")
+    column = layout.column(align=True)
+    column.operator("contact.paint", icon="BRUSH_DATA")
+    column.operator("contact.add_surfaces", icon="MESH_DATA")
 
 
 def _draw_patches(layout: Any, settings: Any, document: Any) -> None:
-    box = layout.box()
-    box.label(text=f"Patches: {len(document.patches)}")
-    colors = {row.name: row for row in settings.rows}
-    for name in document.patches:
-        line = box.row()
-        if name in colors:
-            swatch = line.row()
-            swatch.enabled = False  # it shows, and sets nothing
-            swatch.prop(colors[name], "color", text="")
-            line.label(text=colors[name].pair, icon="LINKED" if colors[name].pair else "UNLINKED")
-        line.label(text=name)
-    box.prop_search(settings, "patch", settings, "rows")
-    box.prop_search(settings, "other", settings, "rows")
-
-
-def _draw_editing(layout: Any, settings: Any) -> None:
-    column = layout.column(align=True)
-    column.operator("contact.paint", text="Add Selection to Patch").patch = settings.patch
-    for names in (("erase", "select"), ("transfer", "translate"), ("pair", "link"), ("unpair", "unlink")):
-        row = column.row(align=True)
-        for name in names:
-            row.operator(f"contact.{name}")
-    column.prop(settings, "angle")
-    row = column.row(align=True)
-    row.operator("contact.rotate").angle = settings.angle
-    row.operator("contact.bend").angle = settings.angle
-    column.prop(settings, "along")
-    column.prop(settings, "spread")
-    scale = column.operator("contact.scale")
-    scale.along, scale.spread = settings.along, settings.spread
-    column.prop(settings, "name")
-    row = column.row(align=True)
-    row.operator("contact.rename").name = settings.name
-    row.operator("contact.remove")
-
-
-def _draw_pairs(layout: Any, settings: Any, found: shared.Held, scene: Any) -> None:
-    box = layout.box()
-    fresh = found.solved == found.session.revision
-    box.label(text="Pairs" if fresh or not found.residuals else "Pairs (edited since the last solve)")
-    for name in found.session.document.pairs:
-        residual = found.residuals.get(name)
-        line = box.row()
-        line.label(text=name)
-        line.label(text="not solved" if residual is None else f"within {residual:.3g}")
-    box.prop(settings, "penetration")
-    box.prop(settings, "keyed")
-    solve = box.operator("contact.solve")
-    solve.penetration, solve.keyed = settings.penetration, settings.keyed
-    solve.first, solve.last = scene.frame_start, scene.frame_end
-    row = box.row(align=True)
-    row.operator("contact.settle")
-    row.operator("contact.slide")
-    row.operator("contact.clear_pose")
+    row = layout.row()
+    row.template_list("CONTACT_UL_patches", "", settings, "rows", settings, "row", rows=3)
+    column = row.column(align=True)
+    column.operator("contact.paint", text="", icon="ADD").patch = ""
+    column.operator("contact.remove", text="", icon="REMOVE")
+    column.separator()
+    column.operator("contact.select", text="", icon="RESTRICT_SELECT_OFF")
+    if settings.patch in document.patches:
+        layout.label(text=f"On {document.patch(settings.patch).surface}", icon="MESH_DATA")
+    row = layout.row(align=True)
+    row.operator("contact.paint", text="Add Selection", icon="BRUSH_DATA").patch = settings.patch
+    row.operator("contact.erase", text="Erase Selection")
+    layout.operator("contact.add_surfaces", icon="MESH_DATA")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 if TYPE_CHECKING:
+    from contact_core.document.document import ContactDocument
     from contact_core.proposals.proposal import Proposal
     from contact_core.session import Session
 
@@ -33,6 +34,7 @@ class Held:
 
 
 _held: dict[int, Held] = {}
+_listing: list[bool] = []
 
 
 def missing() -> str:
@@ -101,19 +103,38 @@ def list_patches() -> None:
     found, manager = held(), bpy.context.window_manager
     if found is None or not hasattr(manager, "contact"):  # a script may use the session without the panel
         return
-    document, settings = found.session.document, manager.contact
-    if settings.patch not in document.patches:
-        settings.patch = next(iter(reversed(list(document.patches))), "")
-    rows = settings.rows
-    pair_of = {end: name for name, pair in document.pairs.items() for end in (pair.manipulator, pair.object)}
-    rows.clear()
-    for patch in document.patches.values():
-        row = rows.add()
-        row.name, row.color, row.pair = patch.name, patch.color, pair_of.get(patch.name, "")
+    _listing.append(True)
+    try:
+        _fill(manager.contact, found.session.document)
+    finally:
+        _listing.pop()
     for window in manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
+
+
+def is_listing() -> bool:
+    """Whether rows change because the document did, and not by the user's hand."""
+    return bool(_listing)
+
+
+def _fill(settings: Any, document: ContactDocument) -> None:
+    """Rows of patches and pairs; the active ones stay, where they are still there."""
+    if settings.patch not in document.patches:
+        settings.patch = next(iter(reversed(list(document.patches))), "")
+    if settings.pair not in document.pairs:
+        settings.pair = next(iter(reversed(list(document.pairs))), "")
+    pair_of = {end: name for name, pair in document.pairs.items() for end in (pair.manipulator, pair.object)}
+    settings.rows.clear()
+    for patch in document.patches.values():
+        row = settings.rows.add()
+        row.name = row.label = patch.name
+        row.color, row.pair = patch.color, pair_of.get(patch.name, "")
+    settings.pairs.clear()
+    for name, pair in document.pairs.items():
+        row = settings.pairs.add()
+        row.name, row.ends = name, f"{pair.manipulator} \N{RIGHTWARDS ARROW} {pair.object}"
 
 
 def keep_residuals(proposal: Proposal) -> None:
