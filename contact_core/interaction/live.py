@@ -25,10 +25,13 @@ from contact_core.solve.levenberg_marquardt import FIRST_DAMPING, few_steps
 from contact_core.solve.penetration import RESOLUTION
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
+from contact_core.solve.stretch import SkinStretchTerm
 from contact_core.solve.terms import PoseTerm, paper_terms
 
 if TYPE_CHECKING:
     from contact_core.interaction.desk import Desk
+    from contact_core.interaction.settings import InteractionSettings
+    from contact_core.plugins.manager import PluginManager
     from contact_core.session import Session
 
 _STEPS_AT_RELEASE = 40
@@ -188,7 +191,7 @@ class LiveSolve:
     def _terms(self, problem: PoseProblem) -> tuple[PoseTerm, ...]:
         terms = paper_terms(prior=self._desk.settings.prior_weight) + self._desk.pins
         rigid = any(len(body.rig.joints) == 1 and body.black_box is None for body in problem.bodies)
-        return terms + (depth_terms(self._desk) if rigid else ())
+        return terms + body_terms(self._desk, rigid=rigid)
 
     def _held(self, problem: PoseProblem) -> dict[str, tuple[str, ...]]:
         """The joints that are held, by the bodies that have them."""
@@ -256,16 +259,27 @@ def prepare(surfaces: Sequence[tuple[TriangleMesh, bool]], progress: Progress) -
                 DistanceField.of(mesh, resolution=RESOLUTION)
 
 
-def depth_terms(desk: Desk) -> tuple[PoseTerm, ...]:
-    """The term that keeps skin out of what is solid, as the settings want it: the same while a hand follows as in
-    the solve after it, or the one would lead to poses that the other does not find out of again (a thumb drawn
-    through a cup's thin wall)."""
+def body_terms(desk: Desk, *, rigid: bool = True) -> tuple[PoseTerm, ...]:
+    """The terms that keep a hand a hand, as the settings want them: skin stays out of solids, and is not torn.
+
+    They are the same while a hand follows as in the solve after it, or the one would lead to poses that the other
+    does not find out of again (a thumb drawn through a cup's thin wall). rigid: whether there is anything solid.
+    """
     settings, plugins = desk.settings, desk.session.plugins
-    if not settings.penetration or settings.penetration_weight == 0.0 or not plugins.offers(POSE_TERMS):
-        return ()
+    terms: list[PoseTerm] = []
+    if settings.stretch_weight > 0.0:
+        terms.append(SkinStretchTerm(weight=settings.stretch_weight))
+    if rigid and settings.penetration and settings.penetration_weight > 0.0 and plugins.offers(POSE_TERMS):
+        terms.append(_depth_term(settings, plugins))
+    return tuple(terms)
+
+
+def _depth_term(settings: InteractionSettings, plugins: PluginManager) -> PoseTerm:
     if settings.hollows:
-        return (KeepOutOfHollowsTerm(weight=settings.penetration_weight),)
-    return (plugins.make(POSE_TERMS, plugins.name_for(POSE_TERMS, "depth"), weight=settings.penetration_weight),)
+        return KeepOutOfHollowsTerm(weight=settings.penetration_weight)
+    name = plugins.name_for(POSE_TERMS, "depth")
+    term: PoseTerm = plugins.make(POSE_TERMS, name, weight=settings.penetration_weight)
+    return term
 
 
 def _bodies(pins: tuple[Any, ...]) -> tuple[str, ...]:

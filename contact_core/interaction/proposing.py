@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected
-from contact_core.interaction.live import depth_terms
+from contact_core.interaction.live import body_terms
 from contact_core.interaction.overlay import Ghost, Overlay
 from contact_core.interaction.work import Worker
 from contact_core.plugins.registry import GRASP_SAMPLERS
@@ -137,7 +137,7 @@ class Proposing:
         if not session.document.pairs:
             raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
         self.dismiss()
-        terms = paper_terms(prior=settings.prior_weight) + depth_terms(self._desk)
+        terms = paper_terms(prior=settings.prior_weight) + body_terms(self._desk)
         poses = dict(session.document.poses)
         objective = Objective(terms) if settings.prior == "rest" else Objective(terms, prior=poses)
         start, derived, rigs = session.document, session.derived.apart(), dict(session.rigs)

@@ -18,6 +18,7 @@ class InteractionSettings(HasSettings):
     penetration: bool = setting(True, help="skin stays out of the object while the hand follows")
     penetration_weight: float = setting(5.0, low=0.0, help="how much depth counts beside the contacts")
     hollows: bool = setting(True, help="a solve also keeps skin out of hollows in which no contact lies")
+    stretch_weight: float = setting(0.5, low=0.0, help="how much skin that is stretched counts beside the contacts")
     prior: LivePrior = setting(
         "rest", help="what joints are pulled to: rest, the pose before each step, or that at the start of the drag"
     )

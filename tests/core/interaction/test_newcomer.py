@@ -1,7 +1,8 @@
-"""A grasp from nothing: somebody who has read docs/app.md, with a pointer and keys, an open hand and a mug."""
+"""A grasp from nothing: somebody who follows the cards of the tutorial, with an open hand and a mug."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from contact_core.grasping.filled import KeepOutOfHollowsTerm
 from contact_core.grasping.metrics import Contact, PosedScene, measure
 from contact_core.grasping.verdict import Verdict, judge
 from contact_core.interaction.interaction import Interaction
+from contact_core.interaction.lesson import STEPS, Lesson
 from contact_core.interaction.view import Perspective
 from contact_core.plugins.registry import TOOLS
 from contact_core.rig.bones import bone_segments
@@ -27,10 +29,10 @@ from contact_core.session import Session
 from contact_core.solve.body import manipulator_length
 from contact_core.testing.artist import Artist, ball_and_hand, block, shifted
 
-MUG = np.array([0.148, 0.0, 0.0])  # where it stands, beside the hand
-EDIT = np.array([6.0, 0.0])  # pixels
+MUG = np.array([0.14811, 0.0, 0.0])  # where it stands, beside the hand
 MOST = 25  # gestures and keys
 FRONT = Perspective.looking_at((0.08, 0.08, 0.0), (0.08, 0.08, 0.75), viewport=(1280, 720))
+ASKEW = Perspective.looking_at((0.08, 0.08, 0.0), (0.3275, 0.3, 0.44), viewport=(896, 638))  # as the application
 BEHIND = Perspective.looking_at((0.1, 0.08, 0.0), (-0.52, 0.08, -0.42), viewport=(1280, 720))
 
 
@@ -63,18 +65,17 @@ class Newcomer(Artist):
         self.count += 1
         self.view = view
 
-    def along(self, *joints: str, start: float = 0.1, beside: float = 0.0) -> list[Any]:
-        """Pixels along the bones between joints of the hand, `beside` pixels to the right of them."""
-        rig = self.session.rigs["hand"]
-        places = [rig.rest_world[rig.joint_index(joint), :3, 3] for joint in joints]
-        path = [places[0] + start * (places[1] - places[0]), *places[1:-1]]
-        path += [places[-2] + share * (places[-1] - places[-2]) for share in (0.1, 0.5, 0.9)]
-        return [self.at(place) + by(beside, 0.0) for place in path]
-
-    def on_mug(self, angle: float, height: float) -> Any:
-        """The pixel of a place on the mug's wall: degrees from its handle toward the front, metres."""
-        turn = np.radians(angle)
-        return self.at(np.add(MUG, (0.041 * np.cos(turn), height, 0.041 * np.sin(turn))))
+    def drag_the_mark(self, lesson: Lesson, *held: Any) -> None:
+        """Drag along what the card marks, after a turn of the view where it lies on the far side."""
+        self.hands.desk.view = self.view
+        if lesson.card().far_side:
+            self.orbit(BEHIND)
+        self.hands.desk.view = self.view
+        assert not lesson.card().far_side and lesson.overlay().axes
+        shown = lesson.marked()
+        assert shown is not None
+        self.drag(*self.view.project(shown[0])[:, :2], held=held)
+        lesson.follow()
 
 
 @pytest.fixture
@@ -84,8 +85,10 @@ def newcomer() -> Iterator[Newcomer]:
         yield Newcomer(session, Interaction(session), FRONT)
 
 
-def finger(name: str) -> tuple[str, str, str]:
-    return f"{name}_intermediate", f"{name}_distal", f"{name}_tip"
+def keys_of(lesson: Lesson, step: str) -> list[str]:
+    """The keys that the card of a step names, in their order."""
+    assert STEPS[lesson.number].name == step, lesson.card()
+    return re.findall("`([^`]+)`", lesson.card().words)
 
 
 def verdict(session: Session) -> Verdict:
@@ -106,36 +109,40 @@ def verdict(session: Session) -> Verdict:
     return judge(metrics, {}, {})
 
 
-def test_a_grasp_from_nothing(newcomer: Newcomer, repository: Path) -> None:
-    session, hands = newcomer.session, newcomer.hands
-    newcomer.key("B")
-    for _ in range(3):
-        newcomer.key("[")
-    for name in ("middle", "ring"):
-        newcomer.drag(*newcomer.along(*finger(name), start=0.4), held=("shift",))
-    newcomer.drag(*newcomer.along("thumb_distal", "thumb_tip", beside=-8.0), held=("shift",))
-    newcomer.drag(*newcomer.along(*finger("index"), start=0.4), held=("shift",))
-    assert len(session.document.patches) == 4
-    newcomer.key("W")
-    newcomer.drag(*newcomer.along(*finger("index"), start=0.4))
-    newcomer.key("T")
+@pytest.mark.parametrize("view", [FRONT, ASKEW], ids=["front", "askew"])
+def test_a_grasp_from_nothing(newcomer: Newcomer, repository: Path, view: Perspective) -> None:
+    """Somebody who does what the cards of the tutorial say, and nothing else."""
+    session, hands, newcomer.view = newcomer.session, newcomer.hands, view
+    lesson = Lesson(hands)
+    paint, smaller, shift = keys_of(lesson, "paint")
+    for key in (paint, smaller, smaller):
+        newcomer.key(key)
+    while lesson.number == 0:
+        newcomer.drag_the_mark(lesson, shift.lower())
+    newcomer.key(keys_of(lesson, "axis")[0])
+    newcomer.drag_the_mark(lesson)
+    transfer, other = keys_of(lesson, "transfer")
+    newcomer.key(transfer)
     while hands.selection.surface != "mug":
-        newcomer.key("Tab")
-    for angle, height in ((92.0, 0.085), (84.0, 0.054), (90.0, 0.033)):  # index, middle, ring: one after the other
-        newcomer.drag(newcomer.on_mug(angle, height), newcomer.on_mug(angle - 20.0, height))
-    newcomer.orbit(BEHIND)
-    newcomer.drag(newcomer.on_mug(254.0, 0.09), newcomer.on_mug(270.0, 0.09))
-    assert len(session.document.pairs) == 4, "a transfer pairs, and takes up the next patch"
-    newcomer.key("Shift+Space")
-    newcomer.key("Enter")
+        newcomer.key(other)
+    for place in range(4):
+        assert lesson.card().progress == f"{place} of 4"
+        newcomer.drag_the_mark(lesson)
+    assert STEPS[lesson.number].name == "pair" and lesson.card().done, "a transfer pairs"
+    newcomer.count += 1
+    lesson.next()
+    for key in keys_of(lesson, "solve")[:2]:
+        newcomer.key(key)
+    lesson.follow()
     solved, first = verdict(session), newcomer.count
-    newcomer.key("G")
-    grabbed = newcomer.pixel("mug", session.geometry.points(session.document.partners("contact.3")[0]))[0]
-    newcomer.drag(grabbed, grabbed + by(*(0.5 * EDIT)), grabbed + by(*EDIT))
-    newcomer.key("Shift+Space")
-    newcomer.key("Enter")
+    newcomer.key(keys_of(lesson, "edit")[0])
+    newcomer.drag_the_mark(lesson)
+    for key in keys_of(lesson, "again")[:2]:
+        newcomer.key(key)
+    lesson.follow()
     edited = verdict(session)
     print(f"a grasp from nothing: {newcomer.count} gestures and keys, {first} until it is solved")  # noqa: T201
+    assert lesson.is_over and lesson.card().over and all(done for _, done in lesson.card().steps)
     assert solved.is_grasp, solved.failures
     assert edited.is_grasp, edited.failures
     assert newcomer.count <= MOST

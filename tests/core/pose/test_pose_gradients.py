@@ -10,6 +10,7 @@ import pytest
 from contact_core.rig.rig import Pose, Rig
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.problem import PoseProblem
+from contact_core.solve.stretch import SkinStretchTerm
 from contact_core.testing import meshes, rigs
 
 STEP = 1e-5
@@ -115,3 +116,18 @@ def test_gauss_newton_matrix_is_that_of_the_residuals() -> None:
     expected = expected + problem.bound_terms["prior"].normal_matrix(state)
     got = problem.normal_matrix(state)
     assert np.abs(got - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_gradient_of_the_stretch_of_the_skin(name: str) -> None:
+    """Alone, at poses that stretch; at rest nothing costs anything."""
+    problem = replace(two_bodies(RIGS[name](), "squares"), terms=(SkinStretchTerm(allowed=1.05, samples=400),))
+    random = np.random.default_rng(2)
+    lower, upper = problem.limits_of_theta
+    theta = np.clip(random.normal(0.0, 0.6, len(problem.start)), lower, upper)
+    assert problem.value(problem.state(theta)) > 0.0
+    assert_gradient(problem, theta)
+    matrix = problem.normal_matrix(problem.state(theta))
+    assert np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min() > -1e-9 * np.abs(matrix).max()
+    if name != "scaled":  # that one is bound elsewhere than at rest
+        assert problem.value(problem.state(np.zeros(len(theta)))) == 0.0
