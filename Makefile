@@ -13,7 +13,7 @@ READY := $(VENV)/.ready
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo gallery test explore test-blender-all test-blender-window blender-extension lint typecheck pytest wheel matrix bench docs contract-report clean
+.PHONY: help demo gallery test explore test-blender-all test-blender-window blender-extension blender-extensions lint typecheck pytest wheel matrix bench docs contract-report clean
 
 help:
 	@echo "make demo | test | lint | bench | docs | clean"
@@ -64,6 +64,10 @@ test-blender-window: $(READY)
 BLENDER_PYTHON ?= 3.11
 blender-extension: $(READY)
 	$(BIN)/python adapters/blender/build_extension.py --python $(BLENDER_PYTHON)
+
+# Those of all platforms, with the sizes and hashes of their wheels.
+blender-extensions: $(READY)
+	$(BIN)/python adapters/blender/build_extension.py --all
 
 wheel: $(READY)
 	$(BIN)/python .ci/wheel.py

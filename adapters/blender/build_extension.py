@@ -1,8 +1,9 @@
 """Build the extension that Blender installs: `python adapters/blender/build_extension.py [--python 3.11]`.
 
-One zip for this platform and one Python: 3.11 is Blender 4.2 to 5.0, 3.13 is 5.1 and later. Our own packages are
-vendored; what they need comes as unmodified wheels from the package index, whose SHA-256 the zip lists. numpy is
-never in it: Blender brings its own, and a second one in front of it would break Blender (ADR 0078).
+One zip for one platform and one Python: 3.11 is Blender 4.2 to 5.0, 3.13 is 5.1 and later (3.14: Debian's); `--all`
+makes those for which blender.org has a Blender. Our own packages are vendored; what they need comes as unmodified
+wheels from the package index, whose SHA-256 the zip lists. numpy is never in it: Blender brings its own, and a
+second one in front of it would break Blender (ADR 0078).
 """
 
 from __future__ import annotations
@@ -26,22 +27,31 @@ PACKAGES = {
     "contact_builtins": REPOSITORY / "plugins" / "contact_builtins",
     "contact_blender": REPOSITORY / "adapters" / "blender" / "contact_blender",
 }
-BLENDERS = {
+BLENDERS = {  # the first version, and the first no more
     "3.11": ("4.2.0", "5.1.0"),
     "3.13": ("5.1.0", None),
-    "3.14": ("5.1.0", None),
-}  # the first version, and the first no more
-NUMPY = {
+    "3.14": ("5.1.0", None),  # as distributions build it
+}
+NUMPY = {  # as in those Blenders: wheels must fit it
     "3.11": "numpy==1.26.4",
     "3.13": "numpy>=2,<3",
     "3.14": "numpy>=2,<3",
-}  # as in those Blenders: wheels must fit it
+}
 PLATFORMS = {
     ("Linux", "x86_64"): "linux-x64",
     ("Windows", "AMD64"): "windows-x64",
     ("Darwin", "arm64"): "macos-arm64",
     ("Darwin", "x86_64"): "macos-x64",
 }
+TAGS = {  # of wheels, the newest system first that every Blender for the platform runs on
+    "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64"),
+    "windows-x64": ("win_amd64",),
+    "macos-arm64": ("macosx_12_0_arm64",),
+    "macos-x64": ("macosx_12_0_x86_64",),
+}
+RELEASED = tuple(
+    (python, system) for python in ("3.11", "3.13") for system in TAGS if (python, system) != ("3.13", "macos-x64")
+)
 PERMISSIONS = {"files", "network", "clipboard", "camera", "microphone"}
 ENTRY = '''"""Contact areas for posing. All of it is in vendor/contact_blender/extension."""
 
@@ -76,12 +86,17 @@ class NotBuilt(Exception):
     """The zip could not be made; the text says why."""
 
 
-def manifest(wheels: Iterable[str], python: str) -> dict[str, Any]:
-    """What blender_manifest.toml says. wheels: file names."""
-    first, end = BLENDERS[python]
+def this_platform() -> str:
+    """Blender's name for the platform that this runs on. Raises NotBuilt."""
     here = PLATFORMS.get((platform.system(), platform.machine()))
     if here is None:
         raise NotBuilt(f"Blender has no name for this platform ({platform.system()}, {platform.machine()}).")
+    return here
+
+
+def manifest(wheels: Iterable[str], python: str, system: str | None = None) -> dict[str, Any]:
+    """What blender_manifest.toml says. wheels: file names. system: Blender's name of a platform."""
+    first, end = BLENDERS[python]
     return {
         "schema_version": "1.0.0",
         "id": "contact_core",
@@ -94,7 +109,7 @@ def manifest(wheels: Iterable[str], python: str) -> dict[str, Any]:
         "license": ["SPDX:GPL-3.0-or-later"],
         "blender_version_min": first,
         **({} if end is None else {"blender_version_max": end}),
-        "platforms": [here],
+        "platforms": [system or this_platform()],
         "wheels": [f"./wheels/{name}" for name in wheels],
         "permissions": {"files": "Save and load contact documents and sets"},
     }
@@ -126,30 +141,29 @@ def mistakes(said: Mapping[str, Any], files: Iterable[str]) -> list[str]:
     return found
 
 
-def download(folder: Path, python: str) -> list[Path]:
-    """The wheels of what we need, for this platform, without numpy. Raises NotBuilt."""
+def download(folder: Path, python: str, system: str | None = None) -> list[Path]:
+    """The wheels of what we need for a platform, without numpy. Raises NotBuilt."""
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     needed = [each for each in project["dependencies"] if not each.startswith("numpy")]
     pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"]
-    made = subprocess.run(
-        [*pip, "--only-binary=:all:", "--python-version", python, "--dest", str(folder), *needed, NUMPY[python]],
-        capture_output=True, text=True,
-    )  # fmt: skip
+    tags = [part for tag in TAGS[system or this_platform()] for part in ("--platform", tag)]
+    chosen = ["--only-binary=:all:", "--python-version", python, *tags, "--dest", str(folder)]
+    made = subprocess.run([*pip, *chosen, *needed, NUMPY[python]], capture_output=True, text=True)
     if made.returncode:
         raise NotBuilt("pip could not download the wheels: " + (made.stderr.strip().splitlines() or ["?"])[-1])
     return sorted(path for path in folder.glob("*.whl") if not path.name.lower().startswith("numpy-"))
 
 
-def build(target: Path, wheels: Iterable[Path], python: str) -> Path:
+def build(target: Path, wheels: Iterable[Path], python: str, system: str | None = None) -> Path:
     """Write the zip, the same bytes for the same content. Raises NotBuilt for a manifest with mistakes."""
     wheels = list(wheels)
     files = {f"vendor/{name}": data for name, data in vendored()}
     files["__init__.py"], files["NOTICE"] = ENTRY.encode(), NOTICE.encode()
     files["LICENSE"] = (REPOSITORY / "LICENSE").read_bytes()
     files |= {f"wheels/{path.name}": path.read_bytes() for path in wheels}
-    sums = [f"{hashlib.sha256(files[f'wheels/{path.name}']).hexdigest()}  {path.name}" for path in wheels]
+    sums = [f"{_sha256(path)}  {path.name}" for path in wheels]
     files["wheels/SHA256SUMS"] = "".join(f"{line}\n" for line in sums).encode()
-    said = manifest([path.name for path in wheels], python)
+    said = manifest([path.name for path in wheels], python, system)
     wrong = mistakes(said, files)
     if wrong:
         raise NotBuilt("the manifest is wrong: " + " ".join(wrong))
@@ -201,24 +215,35 @@ def _toml(said: Mapping[str, Any]) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--python", choices=sorted(BLENDERS), default="3.11")
+    parser.add_argument("--platform", choices=sorted(TAGS), help="by default this one")
+    parser.add_argument("--all", action="store_true", help="every zip that is released")
     parser.add_argument("--out", type=Path, default=REPOSITORY / "dist")
     parser.add_argument("--no-wheels", action="store_true", help="for a Blender that has the libraries already")
     chosen = parser.parse_args()
     try:
-        with tempfile.TemporaryDirectory(prefix="contact-wheels-") as scratch:
-            wheels = [] if chosen.no_wheels else download(Path(scratch), chosen.python)
-            here = PLATFORMS.get((platform.system(), platform.machine()), "")
-            name = f"contact_core-{_version()}-{here}-python{chosen.python}.zip"
-            target = build(chosen.out / name, wheels, chosen.python)
+        wanted = RELEASED if chosen.all else [(chosen.python, chosen.platform or this_platform())]
+        for python, system in wanted:
+            print(_built(chosen.out, python, system, not chosen.no_wheels), flush=True)
     except NotBuilt as reason:
         print(f"The extension was not built: {reason}")
         return 1
-    print(f"{target}: {target.stat().st_size / 1e6:.1f} MB, {len(wheels)} wheels")
-    for wheel in wheels:
-        print(f"  {wheel.name}")
     return 0
+
+
+def _built(folder: Path, python: str, system: str, bundles: bool) -> str:
+    """Make one zip; what it is, in words, with the hashes of its wheels. Raises NotBuilt."""
+    with tempfile.TemporaryDirectory(prefix="contact-wheels-") as scratch:
+        wheels = download(Path(scratch), python, system) if bundles else []
+        name = f"contact_core-{_version()}-{system}-python{python}.zip"
+        target = build(folder / name, wheels, python, system)
+        sizes = [f"{path.stat().st_size / 1e6:6.1f} MB  {_sha256(path)[:16]}  {path.name}" for path in wheels]
+    return "\n  ".join([f"{target}: {target.stat().st_size / 1e6:.1f} MB, {len(wheels)} wheels", *sizes])
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 if __name__ == "__main__":

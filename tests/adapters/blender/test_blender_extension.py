@@ -500,6 +500,18 @@ def test_a_missing_library_is_a_sentence(bpy: Any, shared: Any, monkeypatch: pyt
     assert "numpy 99.1 is needed" in preferences.words()
 
 
+def test_a_broken_library_is_a_sentence(bpy: Any, shared: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from contact_blender.extension import preferences
+
+    monkeypatch.setattr(shared, "_broken", [])
+    monkeypatch.setitem(sys.modules, "scipy.sparse", None)  # as Python refuses one that cannot be loaded
+    choose(bpy, "left")
+    with pytest.raises(RuntimeError, match="scipy is here and cannot be loaded"):
+        bpy.ops.contact.paint()
+    assert preferences.words() == shared.missing() and "scipy" in shared.missing()
+    assert drawn(bpy) == ["A library is missing or broken:", "see the add-on's preferences"]
+
+
 def test_the_operators_say_what_they_do_and_push_no_step_of_their_own(bpy: Any, shared: Any) -> None:
     from contact_blender.extension import operators
 

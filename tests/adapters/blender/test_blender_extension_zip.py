@@ -92,6 +92,15 @@ def test_mistakes_of_a_manifest_are_told(builder: Any, change: dict[str, Any], w
     assert words in " ".join(builder.mistakes({**said, **change}, ["wheels/numpy-1.26.4-cp311.whl"]))
 
 
+def test_every_released_zip_says_its_platform_and_its_blenders(builder: Any) -> None:
+    assert set(builder.TAGS) == set(builder.PLATFORMS.values()) and len(builder.RELEASED) == 7
+    for python, system in builder.RELEASED:
+        said = builder.manifest([], python, system)
+        assert said["platforms"] == [system] and builder.mistakes(said, []) == []
+        assert said["blender_version_min"] == {"3.11": "4.2.0", "3.13": "5.1.0"}[python]
+        assert said.get("blender_version_max") == {"3.11": "5.1.0", "3.13": None}[python]
+
+
 def test_a_numpy_wheel_is_refused(builder: Any, wheel: Path, tmp_path: Path) -> None:
     numpy = wheel.rename(tmp_path / "numpy-1.26.4-py3-none-any.whl")
     with pytest.raises(builder.NotBuilt, match="numpy is never bundled"):

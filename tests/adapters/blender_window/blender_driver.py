@@ -146,6 +146,15 @@ class Window:
         self.region("UI").tag_redraw()
         yield 3
 
+    def scroll_down(self) -> Iterator[Any]:
+        """To the end of the sidebar."""
+        region = self.region("UI")
+        yield from self.move(region.x + 10, region.y + region.height // 2)
+        with self.override("UI"):
+            for _ in range(20):
+                self.bpy.ops.view2d.scroll_down()
+        yield 3
+
     def buttons(self, wanted: str = "", step: int = 11) -> Iterator[Any]:
         """Fills `found`: {call: window pixels} of the sidebar's buttons, by the command that Blender would copy of
         what is under the mouse: "bpy.ops.contact.paint(...)". Ends early at a call that begins as `wanted`."""
@@ -190,7 +199,12 @@ class Window:
         write_png(self.folder / f"{name}.png", pixels)
         return pixels
 
-    # The add-on
+    # Files and the add-on
+
+    def open_file(self, path: str) -> Iterator[Any]:
+        with self.bpy.context.temp_override(window=self.window):
+            self.bpy.ops.wm.open_mainfile(filepath=path)
+        yield 10
 
     def enable(self) -> Any:
         """Enable the extension and return `contact_blender.extension`."""

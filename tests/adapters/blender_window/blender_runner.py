@@ -58,7 +58,7 @@ def blender() -> tuple[str, tuple[int, int], str]:
     version = re.search(r"Blender (\d+)\.(\d+)", said)
     if version is None or (int(version[1]), int(version[2])) < OLDEST:
         raise Unavailable(f"{program} is no Blender of 4.2 or later: {said.strip()[:60]!r}")
-    asked = _blender(program, "-b", "--factory-startup", "--python-expr",
+    asked = run_blender(program, "-b", "--factory-startup", "--python-expr",
                      "import sys; print('python %d.%d' % sys.version_info[:2])")  # fmt: skip
     python = re.search(r"python (\d+\.\d+)", asked.stdout)
     if python is None:
@@ -80,7 +80,7 @@ def run_act(source: Path, name: str, pictures: Path) -> None:
     with screen() as (display, frame), tempfile.TemporaryDirectory(prefix="contact-window-") as scratch:
         width, height = map(str, SIZE)
         report = Path(scratch) / "report.json"
-        done = _blender(
+        done = run_blender(
             program, "--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", width, height,
             "--python-exit-code", "3", "--python", str(HERE / "blender_driver.py"),
             "--", str(source), name, scratch, str(frame),
@@ -130,8 +130,8 @@ def profile(program: str, python: str) -> Path:
     installed = folder / "extensions" / "user_default" / "contact_core"
     if not installed.is_dir():
         shutil.rmtree(folder, ignore_errors=True)
-        target = build_extension.build(folder / "contact.zip", wheels, python)
-        done = _blender(
+        target = zipped(folder / "contact.zip", python)
+        done = run_blender(
             program, "-b", "--command", "extension", "install-file", "-r", "user_default", "--enable", str(target),
             BLENDER_USER_RESOURCES=str(folder),
         )  # fmt: skip
@@ -155,6 +155,13 @@ def _samples() -> Path:
     if made.returncode:
         pytest.skip(f"no samples: {made.stderr.strip().splitlines()[-1]}")
     return folder
+
+
+def zipped(target: Path, python: str) -> Path:
+    """The extension's zip for this Blender."""
+    build_extension.BLENDERS[python] = ("4.2.0", None)  # distributions build older Blenders with newer Pythons
+    built: Path = build_extension.build(target, _wheels(python), python)
+    return built
 
 
 def _renewed(installed: Path) -> None:
@@ -183,7 +190,7 @@ def _wheels(python: str) -> list[Path]:
     return sorted(path for path in folder.glob("*.whl") if not path.name.lower().startswith("numpy-"))
 
 
-def _blender(program: str, *arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
+def run_blender(program: str, *arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     """Run Blender to its end, or for PATIENCE."""
     own = {"LIBGL_ALWAYS_SOFTWARE": "1", "PYTHONFAULTHANDLER": "1", "SDL_AUDIODRIVER": "dummy"}
     inherited = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PYTHONHOME")}

@@ -203,7 +203,7 @@ class CONTACT_PT_contacts(_InSidebar, bpy.types.Panel):  # noqa: N801
     def draw(self, context: Any) -> None:
         layout, gone, found = self.layout, shared.missing(), shared.held()
         if gone:
-            layout.label(text="A library is missing:", icon="ERROR")
+            layout.label(text="A library is missing or broken:", icon="ERROR")
             layout.label(text="see the add-on's preferences")
             return
         if found is None and shared.is_stored():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -35,11 +36,13 @@ class Held:
 
 _held: dict[int, Held] = {}
 _listing: list[bool] = []
+_broken: list[str] = []  # why a library cannot be loaded, found once
 
 
 def missing() -> str:
-    """A sentence about libraries that are not there or too old, "" where all is well. Looked up once."""
-    return _missing(LIBRARIES, OLDEST_NUMPY)
+    """A sentence about libraries that are not there, too old or broken, "" where all is well. Looked up once; what
+    is broken shows when it is loaded."""
+    return _broken[-1] if _broken else _missing(LIBRARIES, OLDEST_NUMPY)
 
 
 @cache
@@ -61,6 +64,21 @@ def _old_numpy(oldest: tuple[int, int]) -> str:
         return ""
     wanted = ".".join(map(str, oldest))
     return f"Contact cannot work: numpy {wanted} is needed, and this Blender has {numpy.__version__}."
+
+
+def _load_libraries() -> None:
+    """Load what the wheels brought. Raises InvalidInput where one is there and cannot be loaded."""
+    from contact_core.errors import InvalidInput
+
+    try:
+        for name in ("llvmlite.binding", "numba", "scipy.sparse"):
+            import_module(name)
+    except Exception as error:  # a file that was cut, one for another platform, one built for another numpy
+        _broken.append(
+            f"Contact cannot work: {name.partition('.')[0]} is here and cannot be loaded ({error}). Remove the"
+            " extension, restart Blender, and install the zip that was built for this Blender and this platform."
+        )
+        raise InvalidInput(_broken[-1]) from error
 
 
 def held() -> Held | None:
@@ -88,6 +106,7 @@ def session() -> Session:
         from contact_core.errors import InvalidInput
 
         raise InvalidInput(gone)
+    _load_libraries()
     from contact_blender.host import BlenderHost
     from contact_core.session import Session
 
