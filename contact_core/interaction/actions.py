@@ -9,8 +9,8 @@ from typing import Literal, TypeAlias
 from contact_core.interaction.events import Key
 from contact_core.interaction.tool import Tool
 
-Group: TypeAlias = Literal["tool", "edit", "selection", "pose", "show", "file", "view"]
-GROUPS: tuple[Group, ...] = ("tool", "edit", "selection", "pose", "show", "file", "view")
+Group: TypeAlias = Literal["tool", "edit", "selection", "pose", "film", "show", "file", "view"]
+GROUPS: tuple[Group, ...] = ("tool", "edit", "selection", "pose", "film", "show", "file", "view")
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,9 @@ ACTIONS: tuple[Action, ...] = (
     Action("pose.before", "Previous suggestion", ("Up",), "pose", "show the grasp before"),
     Action("pose.live", "Live", ("V",), "pose", "whether the hand follows while contacts are dragged"),
     Action("pose.rest", "Rest pose", ("Shift+R",), "pose", "put the hands back to rest"),
+    Action("film.play", "Play", ("Shift+Right",), "film", "play the film from here, or stop it"),
+    Action("film.first", "First frame", ("Shift+Left",), "film", "go to the first frame of the film"),
+    Action("film.onion", "Onion skin", ("O",), "film", "ghosts of the pose before and after the frame"),
     Action("show.xray", "See through", ("X",), "show", "see through the surface that tools do not work on"),
     Action("show.isolate", "Isolate", ("I",), "show", "show only the surface that tools work on"),
     Action("show.help", "Keys", ("?", "Shift+?"), "show", "this table", by_host=True),

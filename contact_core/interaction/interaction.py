@@ -9,6 +9,7 @@ if interaction.advance():            # once a frame, before drawing: the live so
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from contact_core.interaction.desk import Desk
 from contact_core.interaction.drawing import DocumentDrawing
 from contact_core.interaction.editing import EDITS
 from contact_core.interaction.events import Event, Key, Pointer
+from contact_core.interaction.film import FilmDesk
 from contact_core.interaction.live import LiveSolve, prepare
 from contact_core.interaction.overlay import NOTHING, Overlay
 from contact_core.interaction.proposing import Proposing
@@ -49,6 +51,7 @@ class Interaction:
         self.desk = Desk(session, nowhere, meters_per_unit=meters_per_unit)
         self.worker = Worker()
         self.proposing = Proposing(self.desk, self.worker)
+        self.film = FilmDesk(self.desk)
         self._drawing = DocumentDrawing(self.desk)
         self._gesture: Gesture | None = None
         self._button = "none"
@@ -66,6 +69,7 @@ class Interaction:
         """Put back what is under way, stop the work, and listen no more. The session stays open."""
         self.cancel()
         self.worker.close()
+        self.film.worker.close()
         self._stop_listening()
 
     # -- what is in the hand ---------------------------------------------------------------------------------
@@ -161,6 +165,10 @@ class Interaction:
             if self.worker.status is not None:
                 self._touch("work", "status")
             self.worker.poll()
+            if self.film.poll():
+                self._touch("status", "film")
+            if self.film.advance(time.monotonic()):
+                self._touch("film")
         except ContactError as error:
             self._refused(error)
         except BaseException:
@@ -182,7 +190,8 @@ class Interaction:
     @property
     def is_due(self) -> bool:
         """Whether `advance` has something to do: a pose to follow up, work that is under way."""
-        return (self._live is not None and self._live.is_due) or self.worker.status is not None
+        long = self.worker.status is not None or self.film.worker.status is not None
+        return (self._live is not None and self._live.is_due) or long or self.film.playback.is_playing
 
     def cancel(self) -> None:
         """Put back the gesture that is under way: the document is the very one of the press."""
@@ -210,6 +219,9 @@ class Interaction:
             self._camera_has.add(event.button)
             return False
         self._refusal = self.desk.remark = ""
+        if self.film.playback.is_playing:
+            self.film.playback.stop()
+            self._touch("film")
         selection = self.desk.selection
         try:
             gesture = self.desk.tool(self._tool).press(self.desk, event)
@@ -303,7 +315,7 @@ class Interaction:
                 if action == "edit.undo":
                     return  # the gesture was the last thing done
             self._own_actions().get(action, lambda: EDITS[action](self.desk))()
-        self._touch("overlay", "selection", "status", "settings", "visibility", "work")
+        self._touch("overlay", "selection", "status", "settings", "visibility", "work", "film")
 
     def _own_actions(self) -> dict[str, Callable[[], object]]:
         settings = self.settings
@@ -321,19 +333,36 @@ class Interaction:
             "pose.another": lambda: self.proposing.step(+1),
             "pose.before": lambda: self.proposing.step(-1),
             "pose.live": lambda: self.set(live=not settings.live),
+            "film.play": lambda: self.film.play(time.monotonic()),
+            "film.first": lambda: self._show_frame(self.session.timeline.settings.first),
+            "film.onion": lambda: self.show_onion(0 if self.film.onion else 3),
             "show.xray": lambda: self.set(xray=not settings.xray),
             "show.isolate": lambda: self.set(isolate=not settings.isolate),
         }
+
+    def _show_frame(self, frame: float) -> None:
+        self.film.playback.stop()
+        self.session.timeline.go(frame)
+
+    def show_onion(self, count: int, step: float | None = None) -> None:
+        """So many ghosts of the film before and after the frame, so many frames apart. Raises InvalidInput."""
+        if not 0 <= count <= 12 or not (step is None or 0.0 < step < 1e6):
+            raise InvalidInput(f"0 to 12 ghosts, some frames apart, were expected, but got {count} and {step}.")
+        self.film.onion = count
+        self.film.onion_step = self.film.onion_step if step is None else float(step)
+        self._touch("overlay", "film")
 
     def _cancel_something(self) -> None:
         """The innermost thing: the gesture, the work, the proposal."""
         if self._gesture is not None:
             self.cancel()
+        elif self.film.playback.is_playing:
+            self.film.playback.stop()
         elif self.worker.status is not None:
             self.worker.cancel()
         else:
             self.proposing.dismiss()
-        self._touch("overlay", "status", "work")
+        self._touch("overlay", "status", "work", "film")
 
     def resize(self, factor: float) -> None:
         """Make the radius of the tool in the hand larger by a factor. Raises InvalidInput where it has none."""
@@ -350,7 +379,8 @@ class Interaction:
     def overlay(self) -> Overlay:
         """All that is drawn over the scene now."""
         own = self._hover if self._gesture is None else self._gesture.overlay()
-        return self._drawing.overlay().joined(self.proposing.overlay()).joined(own)
+        behind = self._drawing.overlay().joined(self.film.overlay())
+        return behind.joined(self.proposing.overlay()).joined(own)
 
     def changes(self) -> Changes:
         """What changed since the last call."""
@@ -380,7 +410,7 @@ class Interaction:
             self._keep_selection()
         moved = self.desk.follow()
         self._moved |= moved
-        self._touch("document", "overlay")
+        self._touch("document", "overlay", "film")
 
     def _keep_selection(self) -> None:
         """Only what there is can be selected."""

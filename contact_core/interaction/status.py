@@ -7,7 +7,9 @@ from typing import Literal, TypeAlias
 
 from contact_core.interaction.work import WorkStatus
 
-Part: TypeAlias = Literal["document", "overlay", "selection", "tool", "settings", "status", "work", "visibility"]
+Part: TypeAlias = Literal[
+    "document", "overlay", "selection", "tool", "settings", "status", "work", "visibility", "film"
+]
 
 
 @dataclass(frozen=True)

@@ -8,32 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
-from contact_core.contact.pairing import correspond
-from contact_core.contact.tracer import ShapedPatch
+from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument
 from contact_core.document.staleness import motion_source
 from contact_core.document.timeline import PoseKey, address
 from contact_core.edit.command import Command, Macro, apply_command
 from contact_core.edit.commands import SetKeys
 from contact_core.errors import Cancelled, InvalidInput
-from contact_core.motion.placement_keys import PlacementKey, PlacementKeys
 from contact_core.motion.problem import MotionBounds, MotionProblem, MotionWeights
 from contact_core.motion.reduction import MILLIMETRE, Reduction, reduce_poses
 from contact_core.motion.report import MotionReport, motion_report
-from contact_core.motion.sliding import SlidingPatch
 from contact_core.motion.solving import MotionOptions, MotionSolution, solve_motion
 from contact_core.progress import Progress
 from contact_core.proposals.draft import Draft
+from contact_core.proposals.film import FilmProblems
 from contact_core.proposals.proposal import Proposal, SolveSettings
 from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose, Rig
 from contact_core.scene.evaluated_rig import EvaluatedRig
-from contact_core.solve.body import PairedPoints
 from contact_core.solve.penetration import Solids
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, SolveStatus
@@ -162,14 +158,10 @@ class _Motion:
     # --- the problem ----------------------------------------------------------------------------------------
 
     def _problem(self, progress: Progress) -> MotionProblem:
-        problems, drafts = list[PoseProblem](), list[Draft]()
-        for row, frame in enumerate(self.frames):
-            progress.tell(row / len(self.frames), f"frame {frame:g}")
-            drafts.append(self.draft_at(frame))
-            problem = self._problem_at(drafts[-1], frame)
-            length = problems[0].length if problems else problem.manipulator_length  # measured once
-            problems.append(replace(problem, length=length))
-        self.rigs: dict[str, Rig] = drafts[0].rigs
+        problems, first = FilmProblems(self.timed, self.settings.objective).over(
+            self.frames, self.draft_at, progress
+        )
+        self.rigs: dict[str, Rig] = first.rigs
         bodies, free = problems[0].bodies, problems[0].free_of_body
         self.posed = [b.name for b, dofs in zip(bodies, free, strict=True) if b.name in self.rigs and len(dofs)]
         if not self.posed:
@@ -181,48 +173,6 @@ class _Motion:
             self.frames, tuple(problems), self.rate, self.motion.weights, self.motion.bounds,
             self._pins(), reference, self.motion.grounded,
         )  # fmt: skip
-
-    def _problem_at(self, draft: Draft, frame: float) -> PoseProblem:
-        if not draft.document.pairs:
-            raise InvalidInput("solving needs contact pairs with a rig that can be posed: pair patches first.")
-        problem = draft.problem(self.settings.objective)
-        return replace(problem, contacts=tuple(self._calmed(draft, c.name, c, frame) for c in problem.contacts))
-
-    def _calmed(self, draft: Draft, pair: str, contact: PairedPoints, frame: float) -> PairedPoints:
-        """A contact whose patches slide by keys, with their points smoothed over time."""
-        ends = self.timed.pairs[pair]
-        changes: dict[str, Any] = {}
-        for side, patch, order in (
-            ("manipulator_points", ends.manipulator, None),
-            ("object_points", ends.object, self._order(pair)),
-        ):
-            sliding = self._sliding(draft, patch)
-            if sliding is not None:
-                points = draft.derived.seen(self.timed, self.timed.patch(patch).surface, sliding.points(frame))
-                changes[side] = points if order is None else points[order]
-        return replace(contact, **changes) if changes else contact
-
-    def _order(self, pair: str) -> IntArray | None:
-        """Which point of the object's patch belongs to each of the manipulator's, None for the same ones."""
-        shapes = [
-            self.timed.patch(end).shape
-            for end in (self.timed.pairs[pair].manipulator, self.timed.pairs[pair].object)
-        ]
-        return None if shapes[0] == shapes[1] else correspond(*(self.timed.shapes[key] for key in shapes))
-
-    def _sliding(self, draft: Draft, name: str) -> SlidingPatch | None:
-        """A patch that has placement keys, smooth over time; made once."""
-        track = self.timed.tracks.get(address("placement", name))
-        if track is None:
-            return None
-        kept = self.__dict__.setdefault("_slides", {})
-        if name not in kept:
-            document, patch = self.timed, self.timed.patch(name)
-            shaped = ShapedPatch(document.shapes[patch.shape], document.surface_axis(name))
-            mesh = draft.derived.carrier(document, patch.surface)
-            kept[name] = SlidingPatch(mesh, shaped, PlacementKeys(track.of(PlacementKey)))
-        found: SlidingPatch = kept[name]
-        return found
 
     # --- what is keyed already ------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from contact_core.document.document import named
 from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.interaction.actions import Action, action_of
 from contact_core.interaction.events import Event, Pointer
@@ -55,6 +56,8 @@ class Application:
         self._navigation = Navigation(canvas.eye)
         self._camera_moved = True
         self._told = False
+        self._filmed = False
+        self.film_open = False  # whether a timeline is shown, for which the film is measured
         self._meets: list[panel.Residual] = []
         self.open(list(sources))
 
@@ -322,8 +325,25 @@ class Application:
         self.go_to(beyond[0] if by > 0 else beyond[-1])
 
     def go_to(self, frame: float) -> None:
-        """Show another frame. Raises InvalidInput."""
+        """Show another frame; what plays stops. Raises InvalidInput."""
+        self.interaction.film.playback.stop()
         self.session.timeline.go(frame)
+        self._filmed = True
+
+    def play_loop(self, loop: bool) -> None:
+        """Whether the film begins again at its end."""
+        self.interaction.film.playback.loop, self._filmed = loop, True
+
+    def show_worst(self, frame: float, pair: str) -> None:
+        """Go to a frame of a curve, with the pair selected that is meant. Raises ContactError."""
+        self.go_to(float(frame))
+        if pair:
+            self.choose_pair(pair)
+
+    def choose_pair(self, pair: str) -> None:
+        """Select both patches of a pair. Raises CommandRejected."""
+        found = named(self.session.document.pairs, pair, "pair")
+        self.interaction.select(found.manipulator, found.object)
 
     # -- frames --------------------------------------------------------------------------------------------------
 
@@ -331,7 +351,12 @@ class Application:
         """Do what is due, once before each frame: returns what changed, "camera" among it; empty for nothing, so
         that nothing has to be drawn."""
         self.interaction.advance()
+        if self.film_open and not self.interaction.is_busy and not self.interaction.film.playback.is_playing:
+            self.interaction.film.measure()
         parts = self.drawer.follow()
+        if self._filmed:
+            parts |= {"film"}
+            self._filmed = False
         if {"document", "surfaces"} & parts:
             self._meets = panel.residuals(self.session, self.interaction.desk.scene, self.interaction.desk.document)
         if self._camera_moved:

@@ -5,63 +5,36 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
-from contact_core.contact.placement import Link, Placement, Root
 from contact_core.document.document import ContactDocument, named
 from contact_core.document.staleness import motion_source
 from contact_core.document.timeline import (
     CAPTURED,
     Key,
-    PlaceKey,
     PoseKey,
     Span,
     Timeline,
     Track,
     TrackKind,
-    WeightKey,
     address,
-    of_address,
 )
-from contact_core.edit.command import Command, Macro, apply_command
+from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import (
-    ClearPose,
     ClearTrack,
-    Pair,
-    PlaceSurface,
-    Rotate,
     SetKeys,
-    SetPose,
     SetSpans,
     SetTimeline,
-    Settle,
-    Translate,
 )
-from contact_core.edit.derived import Derived
+from contact_core.edit.verbs.keying import Keying, TimedEditor, completed, held, value_of
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.motion.placement_keys import Interpolation, PlacementKey, PlacementKeys
 from contact_core.rig.pose_keys import PoseKeys
-from contact_core.rig.rig import Pose, Rig
 
+SpanPart = Literal["on", "off", "ease_in", "ease_out", "all"]
 EASE = 0.4  # seconds over which a contact fades in and out by default
-
-
-class TimedEditor(Protocol):
-    """What time asks of a session. timed_document: the document with its tracks, of which `document` is a frame."""
-
-    rigs: dict[str, Rig]
-
-    @property
-    def timed_document(self) -> ContactDocument: ...
-
-    @property
-    def derived(self) -> Derived: ...
-
-    def do(self, command: Command) -> object: ...
-
-    def frame_changed(self, before: ContactDocument) -> None: ...
 
 
 class Film:
@@ -174,7 +147,9 @@ class Film:
         at = self.frame if frame is None else float(frame)
         value = value_of(self.document.at(at), kind, name, self._editor.rigs) if value is None else value
         self._editor.do(
-            SetKeys(address(kind, name), self._keys(self.document, kind, name, value, at, interpolation))
+            SetKeys(
+                address(kind, name), Keying(self._editor, at).keys(self.document, kind, name, value, interpolation)
+            )
         )
 
     def take(self, surface: str, clip: PoseKeys) -> None:
@@ -187,7 +162,7 @@ class Film:
         track = self.track("pose", surface)
         keys = []
         for row, (frame, pose) in enumerate(zip(clip.frames, clip.poses, strict=True)):
-            whole = _completed(pose, surface, frame, None, rig)
+            whole = completed(pose, surface, frame, None, rig)
             speeds = None
             if clip.is_cubic:
                 speeds = np.zeros((len(whole.joints), 6))
@@ -206,7 +181,9 @@ class Film:
         if track.key_at(at) is None:
             near = ", ".join(f"{each:g}" for each in sorted(track.frames, key=lambda each: abs(each - at))[:5])
             raise CommandRejected(f"there is no key at frame {at:g} of the {kind} of {name!r}; near it: {near}.")
-        self._editor.do(SetKeys(address(kind, name), self._without(track, name, at), (at,), "Remove a key of"))
+        self._editor.do(
+            SetKeys(address(kind, name), Keying(self._editor, at).without(track, name), (at,), "Remove a key of")
+        )
 
     def move_key(self, kind: TrackKind, name: str, frame: float, to: float) -> None:
         """Take a key from a frame to another one, in place of what is there."""
@@ -228,7 +205,7 @@ class Film:
         self._known(kind, name)
         shown = self.shown(self.document)
         clear = ClearTrack(address(kind, name))
-        self._editor.do(Macro(clear.label(), (clear, _held(shown, kind, name))))
+        self._editor.do(Macro(clear.label(), (clear, held(shown, kind, name))))
 
     # --- spans --------------------------------------------------------------------------------------------------
 
@@ -246,6 +223,24 @@ class Film:
         others = [span for span in self.spans(pair) if span.off < new.on or new.off < span.on]
         self.set_spans(pair, (*others, new))
 
+    def move_span(self, pair: str, frame: float, part: SpanPart, to: float) -> None:
+        """Drag a part of the span that a frame is in (its ramps count) to another frame, as one step.
+
+        part: "on" and "off" are its ends, "ease_in" and "ease_out" where its ramps begin and end, "all" the whole
+        of it, by as much as the frame is moved. An end stops at the other one. Raises CommandRejected where no span
+        is, and where it would reach into another.
+        """
+        old = next((s for s in self.spans(pair) if s.on - s.ease_in <= frame <= s.off + s.ease_out), None)
+        if old is None:
+            raise CommandRejected(f"no span of {pair!r} goes over frame {frame:g}.")
+        others = [span for span in self.spans(pair) if span is not old]
+        low = max((span.off for span in others if span.off < old.on), default=-np.inf)
+        high = min((span.on for span in others if span.on > old.off), default=np.inf)
+        new = moved_span(old, part, float(to), float(to) - float(frame))
+        if not (low < new.on and new.off < high):
+            raise CommandRejected(f"there the span of {pair!r} would reach into another one.")
+        self.set_spans(pair, (*others, new))
+
     def release(self, pair: str, frame: float | None = None) -> None:
         """Take out the span that a frame is in, the frame shown by default. Without spans a pair holds always."""
         at = self.frame if frame is None else float(frame)
@@ -258,170 +253,30 @@ class Film:
         """All spans of a pair; none: it holds always."""
         self._editor.do(SetSpans(pair, tuple(sorted(spans, key=lambda span: span.on))))
 
-    # --- edits at a frame ---------------------------------------------------------------------------------------
-
     def keyed(self, command: Command) -> Command:
         """The command that does at the frame shown what a command does without time: keys where tracks exist."""
         document = self.document
-        return command if not document.tracks else self._keyed(command, document)
+        return command if not document.tracks else Keying(self._editor, self.frame).command(command, document)
 
-    def _keyed(self, command: Command, document: ContactDocument) -> Command:
-        if isinstance(command, Macro):
-            parts = []
-            for part in command.commands:
-                parts.append(self._keyed(part, document))
-                document = apply_command(parts[-1], document)
-            return Macro(command.title, tuple(parts))
-        if isinstance(command, (Translate, Rotate)):
-            return self._key_of(document, "placement", command.patch, command.placement, command)
-        if isinstance(command, SetPose):
-            return self._key_of(document, "pose", command.surface, command.pose, command)
-        if isinstance(command, PlaceSurface):
-            return self._key_of(document, "place", command.surface, command.world_from_surface, command)
-        if isinstance(command, Pair):
-            return self._paired(document, command)
-        if isinstance(command, Settle):
-            return self._settled(document, command)
-        if isinstance(command, ClearPose) and address("pose", command.surface) in document.tracks:
-            raise CommandRejected(f"the pose of {command.surface!r} has keys: clear them, or key its rest pose.")
-        return command
-
-    def _key_of(
-        self, document: ContactDocument, kind: TrackKind, name: str, value: Any, command: Command
-    ) -> Command:
-        where = address(kind, name)
-        if where not in document.tracks:
-            return command
-        return SetKeys(where, self._keys(document, kind, name, value, self.frame), (), command.label() + ": key")
-
-    def _paired(self, document: ContactDocument, command: Pair) -> Command:
-        pair = command.pair
-        key = self._key_of(document, "weight", pair.name, pair.weight, command)
-        if key is command:
-            return command
-        base = document.pairs[pair.name].weight
-        return Macro(command.label(), (Pair(replace(pair, weight=base)), key))
-
-    def _settled(self, document: ContactDocument, command: Settle) -> Command:
-        keys: list[Command] = []
-        for name, placement in command.placements:
-            if address("placement", name) in document.tracks:
-                keys.append(self._key_of(document, "placement", name, placement, command))
-        for name, pose in command.poses.items():
-            if address("pose", name) in document.tracks:
-                keys.append(self._key_of(document, "pose", name, pose, command))
-        if not keys:
-            return command
-        keyed = {key.track for key in keys if isinstance(key, SetKeys)}
-        left = replace(
-            command,
-            placements=tuple(p for p in command.placements if address("placement", p[0]) not in keyed),
-            poses=command.poses.without(*(n for n in command.poses if address("pose", n) in keyed)),
-        )
-        parts = (left, *keys) if left.placements or left.poses else tuple(keys)
-        return Macro(command.label(), parts)
-
-    # --- making keys --------------------------------------------------------------------------------------------
+    # --- inside -------------------------------------------------------------------------------------------------
 
     def _known(self, kind: TrackKind, name: str) -> Track:
         return named(self.document.tracks, address(kind, name), "track")
 
-    def _keys(
-        self,
-        document: ContactDocument,
-        kind: TrackKind,
-        name: str,
-        value: Any,
-        frame: float,
-        interpolation: Interpolation | None = None,
-    ) -> tuple[Key, ...]:
-        """The keys to put so that a thing has a value at a frame."""
-        of_address(address(kind, name))  # raises for a kind that there is not
-        track = document.tracks.get(address(kind, name))
-        if interpolation is None:
-            before = [key for key in (track.keys if track else ()) if key.frame <= frame]
-            interpolation = before[-1].interpolation if before else "smooth"
-        if kind == "placement":
-            return self._placement_keys(document, name, value, frame, interpolation, track)
-        if kind == "weight":
-            return (WeightKey(frame, float(value), interpolation),)
-        if kind == "place":
-            return (PlaceKey(frame, np.asarray(value, float), interpolation),)
-        pose = _completed(value, name, frame, track, self._editor.rigs.get(name))
-        return (PoseKey(frame, pose, None, interpolation),)
 
-    def _placement_keys(
-        self,
-        document: ContactDocument,
-        name: str,
-        value: Placement,
-        frame: float,
-        interpolation: Interpolation,
-        track: Track | None,
-    ) -> tuple[Key, ...]:
-        """The new key with its way, and the one before it with its new way."""
-        if isinstance(value, Link):
-            raise CommandRejected(f"{name!r} is a child and moves with its parent: unlink it before it gets keys.")
-        surface = document.surface(document.patch(name).surface)
-        mesh, digest = self._editor.derived.carrier(document, surface.name), surface.carrier_digest
-        root = value if isinstance(value, Root) else self._editor.derived.walked(mesh, digest, value)
-        if track is None:
-            return PlacementKeys.of(mesh, [(frame, root, interpolation)]).keys
-        old = track.of(PlacementKey)
-        new = PlacementKeys(old).with_key(mesh, frame, root, interpolation).keys
-        return tuple(key for key in new if key not in old)
-
-    def _without(self, track: Track, name: str, frame: float) -> tuple[Key, ...]:
-        """The keys to put when one is taken out: a placement key before it gets a new way."""
-        if not isinstance(track.keys[0], PlacementKey) or len(track.keys) == 1:
-            return ()
-        old = track.of(PlacementKey)
-        mesh = self._editor.derived.carrier(self.document, self.document.patch(name).surface)
-        new = PlacementKeys(old).without_key(mesh, frame).keys
-        return tuple(key for key in new if key not in old)
-
-
-def value_of(document: ContactDocument, kind: TrackKind, name: str, rigs: dict[str, Rig]) -> Any:
-    """What a document without time has: a placement, a pose, a place (4, 4) or a weight. Raises CommandRejected."""
-    if kind == "placement":
-        return document.patch(name).placement
-    if kind == "weight":
-        return named(document.pairs, name, "pair").weight
-    surface = document.surface(name)
-    if kind == "place":
-        return surface.world_from_surface
-    if name in document.poses:
-        return document.poses[name]
-    if name not in rigs:
-        raise CommandRejected(f"{name!r} has no rig that is loaded, and no pose yet: give the pose to key.")
-    return Pose.rest(rigs[name])
-
-
-def _held(document: ContactDocument, kind: TrackKind, name: str) -> Command:
-    """What makes the value of a document without time hold throughout."""
-    if kind == "placement":
-        return Translate(name, document.patch(name).placement)
-    if kind == "weight":
-        return Pair(document.pairs[name])
-    if kind == "place":
-        return PlaceSurface(name, document.surface(name).world_from_surface)
-    return SetPose(name, document.poses[name])
-
-
-def _completed(pose: Pose, name: str, frame: float, track: Track | None, rig: Rig | None) -> Pose:
-    """A pose in the joints that the track has, or that the rig has at its first key."""
-    if track is not None:
-        base = track.pose_at(frame)
-    elif rig is not None:
-        base = Pose.rest(rig)
-    else:
-        return pose
-    strangers = [joint for joint in pose.joints if joint not in base.joints]
-    if strangers:
-        raise CommandRejected(f"the keys of {name!r} know no joint {strangers[0]!r}; they have {base.joints[:6]}.")
-    local = base.local.copy()
-    local[[base.joints.index(joint) for joint in pose.joints]] = pose.local
-    return Pose(base.joints, local)
+def moved_span(span: Span, part: SpanPart, to: float, by: float) -> Span:
+    """A span with a part of it at a frame; the whole of it moves by so many frames."""
+    if part == "on":
+        return replace(span, on=min(to, span.off))
+    if part == "off":
+        return replace(span, off=max(to, span.on))
+    if part == "ease_in":
+        return replace(span, ease_in=max(span.on - to, 0.0))
+    if part == "ease_out":
+        return replace(span, ease_out=max(to - span.off, 0.0))
+    if part == "all":
+        return replace(span, on=span.on + by, off=span.off + by)
+    raise InvalidInput(f"a span has the parts on, off, ease_in, ease_out and all, but got {part!r}.")
 
 
 def _fraction(rate: float | Fraction | tuple[int, int]) -> tuple[int, int]:

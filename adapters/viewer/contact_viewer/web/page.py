@@ -5,6 +5,8 @@ from __future__ import annotations
 from importlib import resources
 from typing import Any
 
+from contact_viewer.web.timeline import timeline
+
 ICONS = {
     "select": "mdi-cursor-default-outline",
     "paint": "mdi-brush-variant",
@@ -38,13 +40,15 @@ def build(server: Any, stream_name: str) -> None:
 
     with VAppLayout(server, full_height=True, theme=("theme", "dark")) as layout:
         layout.root.theme = ("theme",)
-        client.Style(_text("page.css"))
-        client.Script(_text("page.js"))
+        client.Style(_text("page.css") + _text("timeline.css"))
+        client.Script(_text("page.js") + _text("timeline.js"))
         _top(v3, html)
         _tools(v3, html)
         _right(v3, html)
         with v3.VMain(style="position: relative; height: 100vh;"):
-            with html.Div(classes="contact-view", style="inset: 44px 320px 38px 64px;"):
+            with html.Div(
+                classes="contact-view", style=("`inset: 44px 320px ${film_open ? 300 : 38}px 64px;`",)
+            ):  # fmt: skip
                 rca.RemoteControlledArea(
                     name=stream_name, display="image", send_mouse_move=True, event_throttle_ms=8,
                     style="width: 100%; height: 100%;",
@@ -53,29 +57,8 @@ def build(server: Any, stream_name: str) -> None:
                 with html.Div(classes="contact-line"):
                     html.Div("{{ line }}", classes="contact-chip")
                     html.Div("{{ refusal }}", v_if=("refusal",), classes="contact-chip contact-refusal")
-            _strip(v3, html)
+            timeline(v3, html, _button)
         _dialogs(v3, html)
-
-
-def _strip(v3: Any, html: Any) -> None:
-    """The frames at the bottom: keys as marks, and the frame that is shown."""
-    with html.Div(classes="contact-strip"):
-        _button(v3, "mdi-skip-previous", "The key before (Left)", click="trigger('act', ['pose.previous'])")
-        _button(v3, "mdi-key-plus", "Key the pose (A)", click="trigger('act', ['pose.key'])")
-        _button(v3, "mdi-skip-next", "The next key (Right)", click="trigger('act', ['pose.next'])")
-        with html.Div(classes="track"):
-            html.Span(
-                v_for="key in film.keys", key=("key.frame",), classes="mark", style=("'left: ' + key.at + '%'",),
-                title=("'key at frame ' + key.frame",), click="trigger('go_to', [key.frame])",
-            )  # fmt: skip
-            html.Input(
-                type="range", min=("film.first",), max=("film.last",), step="1", value=("film.frame",),
-                input="trigger('go_to', [Number($event.target.value)])", title="Frame",
-            )  # fmt: skip
-        html.Span("{{ film.frame }}", classes="frame")
-        html.Span("of", style="opacity: .6; padding: 0 4px;")
-        html.Input(type="number", value=("film.last",), title="The last frame of the film", classes="last",
-                   change="trigger('film_end', [Number($event.target.value)])")  # fmt: skip
 
 
 def _button(v3: Any, icon: str, tip: str, **attributes: Any) -> None:

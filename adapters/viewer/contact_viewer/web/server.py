@@ -15,6 +15,7 @@ from contact_core.interaction.actions import GROUPS
 from contact_core.plugins.registry import FORMATS, SAMPLES
 from contact_viewer import panel
 from contact_viewer.application import Application
+from contact_viewer.film_panel import drag, film_state
 from contact_viewer.look import THEMES
 from contact_viewer.web.browser_events import key_of
 from contact_viewer.web.guard import HOST, Guard
@@ -23,8 +24,8 @@ from contact_viewer.web.stream import Stream
 
 MAX_UPLOAD = 512 << 20  # bytes of one file
 _PANELS_EVERY = 0.2  # seconds, while something is dragged
-_GROUP_NAMES = {"tool": "Tools", "edit": "Edit", "selection": "Selection", "pose": "Pose", "show": "Show",
-                "file": "File", "view": "View"}  # fmt: skip
+_GROUP_NAMES = {"tool": "Tools", "edit": "Edit", "selection": "Selection", "pose": "Pose", "film": "Film",
+                "show": "Show", "file": "File", "view": "View"}  # fmt: skip
 
 
 class WebApplication:
@@ -181,11 +182,20 @@ class WebApplication:
         told("recolor")(lambda patch, color: app.recolor(str(patch), str(color)))
         told("set")(lambda slot, name, item, value: panel.set_setting(app.interaction, slot, name, item, value))
         told("go_to")(lambda frame: app.go_to(float(frame)))
+        told("film_drag")(
+            lambda what, name, frame, part, to: drag(
+                app.session, what, str(name), float(frame), str(part), float(to)
+            )
+        )
+        told("film_loop")(lambda loop: app.play_loop(bool(loop)))
+        told("show_worst")(app.show_worst)
+        told("choose_pair")(lambda pair: app.choose_pair(str(pair)))
         told("film_end")(lambda last: app.session.timeline.set(last=float(last)))
         told("open")(self._open)
         told("write")(lambda path: app.write(_path(path)))
         told("uploaded")(lambda text, fine: app.say(str(text)))
         self._server.state.change("theme")(self._theme)
+        self._server.state.change("film_open")(self._film_opened)
         self._server.state.change("help_wanted")(self._help_turned)
 
     def _act(self, action: str) -> None:
@@ -209,6 +219,11 @@ class WebApplication:
     def _help_turned(self, help_wanted: bool, **_: Any) -> None:
         self.app.help_wanted = self._help_told = bool(help_wanted)
 
+    def _film_opened(self, film_open: bool, **_: Any) -> None:
+        self.app.film_open = bool(film_open)
+        if self.stream is not None:
+            self.stream.wake()
+
     def _theme(self, theme: str, **_: Any) -> None:
         if theme in THEMES:
             self.app.set_theme(theme)
@@ -222,6 +237,7 @@ class WebApplication:
         state.trame__title = "contact"
         state.update(
             {"theme": "dark", "open_wanted": False, "export_wanted": False, "help_wanted": False, "open_path": "",
+             "film_open": False,
              "export_path": "", "renaming": "", "samples": sorted(self.app.plugins.offers(SAMPLES))}
         )  # fmt: skip
         self._tell(everything=True)
@@ -259,6 +275,7 @@ class WebApplication:
             told["tree"] = app.tree()
             told["report"] = panel.report(app.meets, app.interaction.desk.document)
             told["next_step"] = panel.next_step(app.session, app.interaction)
+        if everything or pending & {"document", "surfaces", "film"}:
             told["film"] = self._film()
         if everything or pending & {"tool", "settings", "visibility"}:
             told["tools"] = self._tools()
@@ -273,14 +290,9 @@ class WebApplication:
                     state[name] = value
 
     def _film(self) -> dict[str, Any]:
-        """The strip of frames: its range, the frame shown, and where keys are, as shares of the range."""
-        film, keys = self.app.session.timeline, self.app.keys
-        first, last = film.settings.first, film.settings.last
-        length = max(last - first, 1e-9)
-        marks = [
-            {"frame": key, "at": round(100 * (key - first) / length, 3)} for key in keys if first <= key <= last
-        ]
-        return {"first": first, "last": last, "frame": film.frame, "keys": marks}
+        film = self.app.interaction.film
+        playing = {"playing": film.playback.is_playing, "loop": film.playback.loop, "onion": film.onion}
+        return film_state(film.view()) | playing
 
     def _tools(self) -> list[dict[str, Any]]:
         active = f"tool.{self.app.interaction.tool}"

@@ -22,6 +22,7 @@ from contact_viewer.web.browser_events import pointer_of
 log = logging.getLogger(__name__)
 _QUICK, _SHARP = 72, 93  # qualities of JPEG
 _REST = 0.25  # seconds without a change, after which a frame stands still
+_PLAYING = 0.008  # seconds between looks at which frame of a film is due
 _POLL = 0.08  # seconds between looks at work that runs beside the window
 _MOST_PIXELS = 2560 * 1600  # of an image: a screen of 4K is drawn a little smaller
 _MOST_WAITING = 400  # events; what comes beyond is dropped, moves first
@@ -115,7 +116,7 @@ class Stream:
             await self._wait()
             try:
                 drawn = await self._frame()
-                if not drawn and not self._sharp:
+                if not drawn and not self._sharp and not self._app.interaction.film.playback.is_playing:
                     await self._send(still=True)
                     self._sharp = True
             except Exception as error:  # one bad frame must not end the application; the document is whole
@@ -126,8 +127,9 @@ class Stream:
 
     async def _wait(self) -> None:
         """Until something happened; for a while only, where something is due by itself."""
-        working = self._app.interaction.worker.status is not None
-        seconds = _POLL if working else None if self._sharp else _REST
+        film = self._app.interaction.film
+        working = self._app.interaction.worker.status is not None or film.worker.status is not None
+        seconds = _PLAYING if film.playback.is_playing else _POLL if working else None if self._sharp else _REST
         with contextlib.suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._wanted.wait(), seconds)
         self._wanted.clear()
