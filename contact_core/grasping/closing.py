@@ -73,8 +73,9 @@ def close_hands(
         float(oppose), angles, starts, fits, clear, rest, palm, travel, np.zeros((bones, 3, 3)), np.zeros(bones),
         np.zeros((bones, 3, 4)), np.zeros((bones, 2, 3)), np.zeros(digits, bool), np.zeros(bones, bool),
         np.zeros(bones, bool), np.zeros(bones), np.zeros(8), np.zeros(3), np.zeros(7), hand.firsts,
-        np.zeros(bones),
+        np.zeros(bones), hand.leads, hand.ratios,
     )  # fmt: skip
+    angles = hand.coupled(angles)
     whole = np.tile(np.eye(4), (n, 1, 1))
     whole[:, :3, :] = frames
     return Closed(whole, angles, starts, fits, clear, rest, palm, travel)

@@ -154,18 +154,23 @@ def close_digit(
     FloatArray, moves: BoolArray, angles: FloatArray, frames: FloatArray, probes: FloatArray, probe_bones:
     IntArray, probe_starts: IntArray, levers: FloatArray, values: FloatArray, origin: FloatArray, spacing:
     float, bar: FloatArray, touch: float, capsules: FloatArray, radii: FloatArray, room: FloatArray, ends:
-    FloatArray, done: BoolArray, going: BoolArray,
+    FloatArray, done: BoolArray, going: BoolArray, leads: IntArray, ratios: FloatArray,
 ) -> float:  # fmt: skip
-    """Curl digit d from `angles` until each joint's link, or one beyond it, touches; returns the least
-    clearance."""
+    """Curl digit d from `angles` until each joint's link, or one beyond it, touches; returns the least clearance.
+
+    leads: (B,) the bone with which each turns, `ratios` times as much, -1 for none.
+    """
     first, end = bones[d], bones[d + 1]
     last_moving = -ONE
     for b in range(first, end):
-        going[b] = moves[b]
-        if moves[b]:
+        going[b] = moves[b] and leads[b] < 0
+        if going[b]:
             last_moving = b
     least = np.inf
     for _ in range(ROUNDS):
+        for b in range(first, end):
+            if leads[b] >= 0:
+                angles[b] = ratios[b] * angles[leads[b]]
         pose_digit(d, base, bones, links, pres, axes, angles, frames)
         least = np.inf
         stop = -ONE
@@ -296,7 +301,7 @@ def close_all(
     FloatArray, out_clear: FloatArray, out_rest: FloatArray, out_palm: FloatArray, out_travel: FloatArray, pres:
     FloatArray, angles: FloatArray, frames: FloatArray, ends: FloatArray, done: BoolArray, going: BoolArray,
     moves: BoolArray, best_angles: FloatArray, fit: FloatArray, mean: FloatArray, none: FloatArray, firsts:
-    IntArray, ceiling: FloatArray,
+    IntArray, ceiling: FloatArray, leads: IntArray, ratios: FloatArray,
 ) -> None:  # fmt: skip
     """Approach and close a hand at every placement (see `closing.close_hands` for the arrays)."""
     digits = len(bones) - 1
@@ -342,7 +347,7 @@ def close_all(
                 least = close_digit(
                     d, placed[n], bones, links, pres, axes, ceiling, moves, angles, frames, probes, probe_bones,
                     probe_starts, levers, values, origin, spacing, bar, touch, capsules, radii, room, ends, done,
-                    going,
+                    going, leads, ratios,
                 )  # fmt: skip
                 misfit = price - 3.0 * min(least, 0.0) / length
                 count, against = 0.0, 0.0
@@ -376,7 +381,7 @@ def close_all(
                 close_digit(
                     d, placed[n], bones, links, pres, axes, ceiling, moves, angles, frames, probes, probe_bones,
                     probe_starts, levers, values, origin, spacing, none, touch, capsules, radii, room, ends, done,
-                    going,
+                    going, leads, ratios,
                 )  # fmt: skip
                 for b in range(first, end):
                     out_angles[n, b] = angles[b]

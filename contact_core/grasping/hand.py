@@ -37,7 +37,8 @@ class Hand:
     links: (B, 3, 4) from the bone before, or rig space, at rest. axes: (B, 3) flexion axes; low, high: (B,).
     starts: (D, S, 3, 3) turns of a digit's first bone to try, with angles and prices (D, S); counts (D,).
     probes: points of skin, by digit; tested: palm and fingers for the approach; rest: skin that is neither.
-    pads: (B, 3) their middles and normals. length: of the hand.
+    pads: (B, 3) their middles and normals. length: of the hand. leads: (B,) the bone with which each turns,
+    `ratios` (B,) times as much, where a robot couples them, -1 for none.
     """
 
     rig: Rig
@@ -67,6 +68,8 @@ class Hand:
     radii: FloatArray
     room: FloatArray
     length: float
+    leads: IntArray
+    ratios: FloatArray
     thumb: int = field(default=-1)
 
     @cached_property
@@ -150,6 +153,15 @@ class Hand:
                 before = result[:, b] = before @ link @ turn
         return result
 
+    def coupled(self, angles: FloatArray) -> FloatArray:
+        """The angles (..., B) with every coupled bone where the one that leads it puts it."""
+        follow = self.leads >= 0
+        if not follow.any():
+            return angles
+        result = angles.copy()
+        result[..., follow] = self.ratios[follow] * angles[..., self.leads[follow]]
+        return result
+
     def turned(self, angles: FloatArray) -> FloatArray:
         """(D,) by how much each digit is bent in all."""
         bent = np.where(self.flexes, angles, 0.0)
@@ -177,10 +189,12 @@ def hand_of(rig: Rig, description: HandDescription, seed: int = 0) -> Hand:
     starts = [_starts(rig, digit) for digit in digits]
     most = max(len(turns) for turns, _, _ in starts)
     pads = _pads(rig, description, joints)
+    axes = np.array([axis for axis, _, _ in bends])
+    leads, ratios = _coupling(rig, joints, axes)
     capsules, radii, room = _capsules(rig, joints, counts)
     return Hand(
         rig=rig, description=description, bones=counts, joints=joints, links=_links(rig, digits),
-        axes=np.array([axis for axis, _, _ in bends]), low=np.array([low for _, low, _ in bends]),
+        axes=axes, low=np.array([low for _, low, _ in bends]),
         high=np.array([high for _, _, high in bends]), flexes=flexes,
         starts=np.array([_padded(turns, most) for turns, _, _ in starts]),
         start_counts=np.array([len(turns) for turns, _, _ in starts], np.int64),
@@ -189,7 +203,7 @@ def hand_of(rig: Rig, description: HandDescription, seed: int = 0) -> Hand:
         probes=probes, probe_bones=probe_bones, probe_starts=probe_starts,
         levers=_levers(rig, probes, probe_bones, counts, joints), tested=tested, tested_bones=tested_bones,
         rest=rest, pads=pads[0], pad_normals=pads[1], has_pad=pads[2], capsules=capsules, radii=radii, room=room,
-        length=length, thumb=thumb,
+        length=length, thumb=thumb, leads=leads, ratios=ratios,
     )  # fmt: skip
 
 
@@ -216,6 +230,19 @@ def _bend(freedom: JointFreedom, bone: DigitBone) -> tuple[FloatArray, float, fl
         low, high = -high, -low
     low, high = (low if np.isfinite(low) else -0.2), (high if np.isfinite(high) else FREE)
     return freedom.frame[:, columns[dof]] * np.sign(along[dof]), min(low, 0.0), max(high, 0.0)
+
+
+def _coupling(rig: Rig, joints: IntArray, axes: FloatArray) -> tuple[IntArray, FloatArray]:
+    """(B,) which bone leads each, -1 for none, and (B,) by how much; both bend positively towards the palm."""
+    leads, ratios = np.full(len(joints), -1, np.int64), np.ones(len(joints))
+    own = np.array([rig.freedoms[joint].frame[:, 0] for joint in joints])
+    signs = np.where(np.einsum("bi,bi->b", own, axes) < 0.0, -1.0, 1.0)
+    for b, joint in enumerate(joints):
+        freedom = rig.freedoms[joint]
+        lead = np.flatnonzero(joints == rig.joints.index(freedom.follows)) if freedom.follows is not None else []
+        if len(lead):
+            leads[b], ratios[b] = lead[0], freedom.ratio * signs[b] * signs[lead[0]]
+    return leads, ratios
 
 
 def _starts(rig: Rig, digit: Digit) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -39,6 +39,8 @@ class Chart:
 
     joint_of_dof: (d,) which joint. is_translation: (d,). lower, upper: (d,) limits, offsets from rest.
     dof_names: "index_1.x" (hinge, ball, Euler turns), "wrist.tx" (translations).
+    leaders, followers, ratios: (f,) dofs of which the second turn by so many times as much as the first. A follower is
+    locked, for no solve chooses it; what it may bend limits its leader.
     """
 
     def __init__(self, rig: Rig, world_from_rig: FloatArray | None = None) -> None:
@@ -88,6 +90,7 @@ class Chart:
         self.lower, self.upper = np.array(lower, float), np.array(upper, float)
         self.prior_weight: FloatArray = np.array(prior_weight, float)
         self.locked: BoolArray = np.array(locked, bool)
+        self._couple()
         self.is_translation: BoolArray = np.zeros(self.size, bool)
         for moved in self.translation_slices:
             self.is_translation[moved] = True
@@ -106,6 +109,30 @@ class Chart:
         self._moving_joints = np.array([j for _, j in movers], np.int64)
         self._moving_dofs = np.array([[s, s + 1, s + 2] for s, _ in movers], np.int64).reshape(-1, 3)
 
+    def _couple(self) -> None:
+        """Followers are no dofs of their own, and limits are kept on both ends."""
+        place = {name: slice_.start for name, slice_ in zip(self.rig.joints, self.rotation_slices, strict=True)}
+        pairs = [
+            (place[freedom.follows], place[joint], freedom.ratio)
+            for joint, freedom in zip(self.rig.joints, self.rig.freedoms, strict=True)
+            if freedom.follows is not None
+        ]
+        self.leaders: IntArray = np.array([leader for leader, _, _ in pairs], np.int64)
+        self.followers: IntArray = np.array([follower for _, follower, _ in pairs], np.int64)
+        self.ratios: FloatArray = np.array([ratio for _, _, ratio in pairs], float)
+        self.locked[self.followers] = True
+        for leader, follower, ratio in pairs:
+            if ratio != 0.0:
+                ends = sorted((self.lower[follower] / ratio, self.upper[follower] / ratio))
+                self.lower[leader] = max(self.lower[leader], min(ends[0], 0.0))
+                self.upper[leader] = min(self.upper[leader], max(ends[1], 0.0))
+
+    def coupled(self, theta: FloatArray) -> FloatArray:
+        """theta (d,) with every follower where its leader puts it."""
+        result = np.array(theta, dtype=np.float64)
+        result[self.followers] = self.ratios * result[self.leaders]
+        return result
+
     @cached_property
     def is_root(self) -> BoolArray:
         """(d,) the dofs that place the whole manipulator: those of root joints and of joints that translate."""
@@ -114,7 +141,15 @@ class Chart:
 
     @cached_property
     def moves(self) -> BoolArray:
-        """(d, j) whether a dof moves a joint: its own joint and all below it."""
+        """(d, j) whether a dof moves a joint: its own joint and all below it, for a leader its followers' too."""
+        moves = self.moves_alone.copy()
+        for leader, follower in zip(self.leaders, self.followers, strict=True):
+            moves[leader] |= moves[follower]
+        return moves
+
+    @cached_property
+    def moves_alone(self) -> BoolArray:
+        """(d, j) the same for each dof by itself, without what follows it."""
         below = np.eye(len(self.rig.joints), dtype=bool)  # below[a, b]: b is a or below a
         for joint, parent in enumerate(self.rig.parents):
             if parent >= 0:
@@ -127,6 +162,7 @@ class Chart:
         Axes are in the joint's rest frame: how the joint turns, in that frame, when a dof grows.
         """
         j = len(self.rig.joints)
+        theta = self.coupled(theta) if len(self.followers) else theta
         rotation = np.broadcast_to(np.eye(3), (j, 3, 3)).copy()
         axes = np.zeros((self.size, 3))
         if len(self._rotvec_dof):
@@ -151,12 +187,12 @@ class Chart:
         return motion, axes, offset
 
     def local(self, theta: FloatArray, leftover: FloatArray | None = None) -> FloatArray:
-        """(j, 4, 4) parent_from_joint at theta (d,)."""
+        """(j, 4, 4) parent_from_joint at theta (d,); followers go where their leaders put them."""
         local = self.rig.rest_local @ self.turns(theta)[0]
         return local if leftover is None else local @ leftover
 
     def motion(self, theta: FloatArray, leftover: FloatArray | None = None) -> Motion:
-        """World transforms and generators at theta (d,)."""
+        """World transforms and generators at theta (d,); the generator of a leader does not move its followers."""
         motion, axes, offset = self.turns(theta)
         local = self.rig.rest_local @ motion
         world = world_from_local(self, local if leftover is None else local @ leftover)
@@ -194,6 +230,7 @@ class Chart:
         theta[self._rotvec_dof] = vectors[self._rotvec_joint, self._rotvec_component]
         for j, dofs in zip(self._euler_joints, self._euler_dofs, strict=True):
             theta[dofs] = _euler_angles(turned[j], self.rig.freedoms[j].order)
+        theta = self.coupled(theta)  # what a pose bends a follower otherwise is left over
         leftover = np.linalg.inv(self.turns(theta)[0]) @ relative
         scale = max(1.0, float(np.abs(self.rig.rest_local[:, :3, 3]).max(initial=0.0)))
         plain = np.abs(leftover - np.eye(4)).max(initial=0.0) < 1e-9 * scale

@@ -71,6 +71,9 @@ def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:
                 f"{rig.name} has no dof {name!r}; near are {', '.join(near or chart.dof_names[:5])}."
             )
         dof = chart.dof_names.index(name)
+        if dof in chart.followers:
+            leader = chart.dof_names[int(chart.leaders[chart.followers == dof][0])]
+            raise InvalidInput(f"{name} of {rig.name} turns with {leader}; set that one.")
         if not (math.isfinite(value) and chart.lower[dof] <= value <= chart.upper[dof]):
             raise InvalidInput(
                 f"{name} of {rig.name} is limited to {chart.lower[dof]:.4g} .. {chart.upper[dof]:.4g}, but got"

@@ -32,6 +32,8 @@ class JointFreedom:
     then three translations (in the rest frame of the joint) when `translates`.
 
     lower, upper: (r,) offsets from rest, radians; -inf/inf where free. Translations have no limits.
+    follows, ratio: a hinge that is coupled to another (a robot's mimic joint) turns by `ratio` times as much from
+    rest as the hinge `follows`; it has no dof that a solve may choose, and its limits bind the other, too.
     prior_weight: (r,) how strongly the prior holds each rotation dof. locked: (r,) dofs a solve never moves.
     """
 
@@ -43,6 +45,8 @@ class JointFreedom:
     prior_weight: FloatArray | None = None
     locked: BoolArray | None = None
     translates: bool = False
+    follows: str | None = None
+    ratio: float = 1.0
 
     def __post_init__(self) -> None:
         if self.kind not in ROTATION_DOFS:
@@ -64,6 +68,11 @@ class JointFreedom:
         fill("prior_weight", self.prior_weight, 1.0, float)
         fill("locked", self.locked, False, bool)
         object.__setattr__(self, "frame", frozen(self.frame, np.float64, (3, 3), "frame of a joint's freedom"))
+        if self.follows is not None and (self.kind != "hinge" or not np.isfinite(self.ratio)):
+            raise InvalidInput(
+                f"a joint that follows another is a hinge with a finite ratio, but got a {self.kind} joint and"
+                f" {self.ratio}."
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +129,21 @@ class Rig:
         if n and (self.skin_joints.min() < 0 or self.skin_joints.max() >= j):
             wrong = self.skin_joints[(self.skin_joints < 0) | (self.skin_joints >= j)]
             raise InvalidInput(f"skin_joints must be in 0..{j - 1}, but got {int(wrong[0])} among them.")
+        self._check_followers()
         off = np.abs(self.skin_weights.sum(axis=1) - 1.0) if n else np.zeros(0)
         if (off > 1e-6).any():
             raise InvalidInput(
                 f"skin weights must sum to 1 per vertex, but those of vertex {int(off.argmax())} sum to"
                 f" {self.skin_weights[off.argmax()].sum():.6g}; normalise them when reading."
             )
+
+    def _check_followers(self) -> None:
+        free = {n for n, f in zip(self.joints, self.freedoms, strict=True) if f.kind == "hinge" and f.follows is None}
+        for name, freedom in zip(self.joints, self.freedoms, strict=True):
+            if freedom.follows is not None and freedom.follows not in free:
+                raise InvalidInput(
+                    f"joint {name!r} follows {freedom.follows!r}, which has to be a hinge of the rig that follows none."
+                )
 
     def joint_index(self, name: str) -> int:
         """Index of a joint by name; raises InvalidInput listing near names."""
@@ -194,6 +212,13 @@ class Rig:
             mesh.kept[key] = rig
         kept: Rig = mesh.kept[key]
         return kept
+
+
+def still_following(joints: Sequence[str], freedoms: Sequence[JointFreedom]) -> tuple[JointFreedom, ...]:
+    """The freedoms of joints, where those that follow a joint which is no longer there, or no hinge, are held: a host
+    may have renamed it."""
+    free = {n for n, f in zip(joints, freedoms, strict=True) if f.kind == "hinge" and f.follows is None}
+    return tuple(f if f.follows is None or f.follows in free else JointFreedom("fixed") for f in freedoms)
 
 
 def tree_order(parents: Sequence[int] | IntArray) -> list[int]:

@@ -199,7 +199,8 @@ class PoseProblem:
         """All dofs of one body: the free ones from theta (d,), the others as they stand."""
         full = self._charted[index][0].copy()
         full[self.free_of_body[index]] = theta[self.dof_slices[index]]
-        return full
+        chart = self.charts[index]
+        return chart.coupled(full) if isinstance(chart, Chart) and len(chart.followers) else full
 
     def pose_names(self, index: int) -> tuple[str, ...]:
         """What a pose of a body names: the joints of a rig, the dofs of a black box."""
@@ -309,6 +310,43 @@ class PoseProblem:
         return result
 
     @cached_property
+    def fields_of_body(self) -> tuple[IntArray, ...]:
+        """Per body, the dofs of its chart that theta moves: the free ones, then those that follow them."""
+        return tuple(
+            np.concatenate([free, chart.followers[np.isin(chart.leaders, free)]]) if isinstance(chart, Chart) else free
+            for chart, free in zip(self.charts, self.free_of_body, strict=True)
+        )
+
+    @cached_property
+    def field_moves(self) -> FloatArray:
+        """(e, j) as `moves`, for each of `fields_of_body` by itself."""
+        result = np.zeros((sum(map(len, self.fields_of_body)), int(self.bone_offsets[-1])))
+        row = 0
+        for i, (chart, fields) in enumerate(zip(self.charts, self.fields_of_body, strict=True)):
+            alone = chart.moves_alone if isinstance(chart, Chart) else chart.moves
+            columns = slice(int(self.bone_offsets[i]), int(self.bone_offsets[i + 1]))
+            result[row : row + len(fields), columns] = alone[fields]
+            row += len(fields)
+        return result
+
+    @cached_property
+    def coupling(self) -> FloatArray | None:
+        """(d, e) by how much each of `fields_of_body` moves when a free dof grows; None where nothing follows."""
+        if all(map(np.array_equal, self.fields_of_body, self.free_of_body)):
+            return None
+        result = np.zeros((len(self.dof_names), len(self.field_moves)))
+        column = 0
+        for chart, free, fields, rows in zip(
+            self.charts, self.free_of_body, self.fields_of_body, self.dof_slices, strict=True
+        ):
+            own = np.eye(chart.size)
+            if isinstance(chart, Chart):
+                own[chart.leaders, chart.followers] = chart.ratios
+            result[rows, column : column + len(fields)] = own[np.ix_(free, fields)]
+            column += len(fields)
+        return result
+
+    @cached_property
     def pairs(self) -> Pairs:
         """The contact pairs as tracks."""
         return pairs_of(self)
@@ -398,7 +436,7 @@ class PoseProblem:
 _KEPT = (  # by problems that continue another: all that neither contacts nor the start change
     "charts", "is_rigid", "free_of_body", "dof_slices", "dof_names", "limits_of_theta", "is_translation", "is_root",
     "scale", "prior_weights", "_charted", "_leftovers", "prior_theta", "bone_offsets", "watched_offsets",
-    "watched_dofs", "moves", "_still", "_moved_bones", "kept_tracks",
+    "watched_dofs", "moves", "fields_of_body", "field_moves", "coupling", "_still", "_moved_bones", "kept_tracks",
 )  # fmt: skip
 
 

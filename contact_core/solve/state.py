@@ -149,15 +149,15 @@ class PoseState:
 
     @cached_property
     def _generators(self) -> FloatArray:
-        """(d, 3, 4) velocity fields of the free dofs."""
-        parts = [m.generators[free] for m, free in zip(self.motions, self.problem.free_of_body, strict=True)]
+        """(e, 3, 4) velocity fields of the free dofs and of those that follow them."""
+        parts = [m.generators[rows] for m, rows in zip(self.motions, self.problem.fields_of_body, strict=True)]
         return np.concatenate(parts)
 
     def _derivative(self, track: Track) -> FloatArray:
         """(d, 3, width b) derivative of the bones (or normal carriers) that a track uses."""
         key = (track.width, track.bones.tobytes())
         if key not in self._derivatives:
-            d, b = len(self.theta), len(track.bones)
+            d, b = len(self.problem.field_moves), len(track.bones)
             if track.width == 4:
                 fields, carrier = self._generators, self.world.transpose(1, 0, 2)[:, track.bones].reshape(4, -1)
             else:
@@ -165,6 +165,8 @@ class PoseState:
                 fields = np.einsum("daa->d", linear)[:, None, None] * np.eye(3) - linear.transpose(0, 2, 1)
                 carrier = self._carriers[track.columns].T
             moved = (fields.reshape(3 * d, -1) @ carrier).reshape(d, 3, b, track.width)
-            moved *= self.problem.moves[:, None, track.bones, None]
-            self._derivatives[key] = moved.reshape(d, 3, -1)
+            moved *= self.problem.field_moves[:, None, track.bones, None]
+            coupling = self.problem.coupling
+            moved = moved.reshape(d, -1) if coupling is None else coupling @ moved.reshape(d, -1)
+            self._derivatives[key] = moved.reshape(len(self.theta), 3, -1)
         return self._derivatives[key]

@@ -43,7 +43,8 @@ def test_hinges_limits_mimics_and_slides(tmp_path: Path) -> None:
     rig = asset.rig
     assert rig is not None and rig.joints == ("base", "out", "slide", "follow") and rig.up_axis == "Z"
     kinds = [freedom.kind for freedom in rig.freedoms]
-    assert kinds == ["ball", "hinge", "fixed", "fixed"]
+    assert kinds == ["ball", "hinge", "fixed", "hinge"]
+    assert (rig.freedoms[3].follows, rig.freedoms[3].ratio) == ("out", 2.0)
     hinge = rig.freedoms[1]
     start = 0.4 + 0.1  # zero is outside: a tenth of the range inside the nearer limit
     assert np.allclose([hinge.lower, hinge.upper], [[0.4 - start], [1.4 - start]])
@@ -54,6 +55,22 @@ def test_hinges_limits_mimics_and_slides(tmp_path: Path) -> None:
     assert "out" in said and "slide" in said and "follow" in said
     assert asset.details["mimic"]["follow"] == {"joint": "out", "multiplier": 2.0, "offset": 0.1}
     assert report(asset.mesh).components == 4
+
+
+def test_mimics_of_mimics_and_circles(tmp_path: Path) -> None:
+    chain = PARTS.replace('<link name="c">', '<link name="d"/><link name="c">') + """
+      <joint name="last" type="revolute"><parent link="c"/><child link="d"/><axis xyz="0 0 1"/>
+        <mimic joint="follow" multiplier="-0.5" offset="1"/><limit lower="-0.5" upper="9"/></joint>"""
+    rig = read(tmp_path, chain).rig
+    assert rig is not None and (rig.freedoms[4].follows, rig.freedoms[4].ratio) == ("out", -1.0)
+    start = 0.4 + 0.1 * (1.4 - 0.4)  # last = 0.95 - out may be -0.5: out up to 1.45, its own limit is nearer
+    assert np.allclose(rig.rest_local[4, :3, :3], about([0, 0, 1], 0.95 - start))
+    tight = read(tmp_path, chain.replace('lower="-0.5"', 'lower="-0.25"')).rig
+    assert tight is not None and np.allclose(tight.freedoms[1].upper, 1.2 - (0.4 + 0.1 * 0.8))
+    with pytest.raises(FileRefused, match="mimics itself"):
+        read(tmp_path, chain.replace('<mimic joint="out"', '<mimic joint="last"'))
+    none = read(tmp_path, chain.replace('upper="9"/>', 'upper="-0.49"/>'))
+    assert any("not kept" in note for note in none.notes)
 
 
 def test_a_sidecar_overrides_the_file(tmp_path: Path) -> None:

@@ -148,6 +148,7 @@ def to_json(freedom: JointFreedom) -> dict[str, Any]:
         "kind": freedom.kind, "order": freedom.order, "frame": np.asarray(freedom.frame).tolist(),
         "lower": plain(freedom.lower), "upper": plain(freedom.upper), "prior": plain(freedom.prior_weight),
         "locked": [bool(lock) for lock in np.asarray(freedom.locked)], "translates": freedom.translates,
+        "follows": freedom.follows, "ratio": freedom.ratio,
     }  # fmt: skip
 
 
@@ -160,5 +161,5 @@ def from_json(values: dict[str, Any]) -> JointFreedom:
     return JointFreedom(
         values["kind"], np.array(values["frame"]), values["order"], np.array(bounds("lower", -np.inf)),
         np.array(bounds("upper", np.inf)), np.array(bounds("prior", 1.0)), np.array(values["locked"], bool),
-        bool(values["translates"]),
+        bool(values["translates"]), values.get("follows"), float(values.get("ratio", 1.0)),
     )  # fmt: skip

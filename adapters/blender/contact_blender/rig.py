@@ -23,7 +23,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
-from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics, tree_order
+from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics, still_following, tree_order
 
 UNMOVED = "(unmoved)"  # the joint of vertices that no bone moves
 REST_BASIS = "contact_rest_basis"  # on a pose bone: the rest pose as an offset from the armature's own rest
@@ -115,7 +115,8 @@ def read_rig(scene_object: Any, armature: Any, depsgraph: Any, name: str) -> Rig
         names, parents = (*names, UNMOVED), np.append(parents, -1)
         rest, bind = np.concatenate([rest, np.eye(4)[None]]), np.concatenate([bind, np.eye(4)[None]])
         freedoms.append(JointFreedom("fixed"))
-    rig = Rig(name, names, parents, rest, bind, points[kept], faces, joints[kept], weights[kept], tuple(freedoms))
+    coupled = still_following(names, freedoms)
+    rig = Rig(name, names, parents, rest, bind, points[kept], faces, joints[kept], weights[kept], coupled)
     return RigReading(rig, sound.point_of, sound.face_of[cut], (*notes, *sound.notes, *cut_notes))
 
 

@@ -50,4 +50,6 @@ def freedom_to_json(freedom: JointFreedom) -> dict[str, object]:
         "upper": limits(freedom.upper),
         "prior_weight": np.asarray(freedom.prior_weight).tolist(),
         "locked": np.asarray(freedom.locked).tolist(),
+        "follows": freedom.follows,
+        "ratio": freedom.ratio,
     }

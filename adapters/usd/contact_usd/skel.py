@@ -18,7 +18,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
-from contact_core.rig.rig import Rig
+from contact_core.rig.rig import Rig, still_following
 from contact_core.scene.host import SceneSpace
 from contact_core.scene.reading import stretch_rig
 from contact_usd.freedoms import read_freedoms
@@ -100,7 +100,7 @@ def read_rig(cache: UsdSkel.Cache, binding: UsdSkel.Binding, space: SceneSpace) 
             faces=np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
             skin_joints=joints,
             skin_weights=weights,
-            freedoms=read_freedoms(prim, len(parents)),
+            freedoms=still_following(joint_names(skeleton), read_freedoms(prim, len(parents))),
             meters_per_unit=space.meters_per_unit,
             up_axis=space.up_axis,
         )

@@ -122,6 +122,7 @@ def _rig_facts(rig: Rig, details: dict[str, Any]) -> dict[str, Any]:
                 "kind": freedom.kind,
                 "dofs": ROTATION_DOFS[freedom.kind] + 3 * freedom.translates,
                 "locked": int(np.count_nonzero(np.asarray(freedom.locked))),
+                **({} if freedom.follows is None else {"follows": freedom.follows, "ratio": freedom.ratio}),
                 "limits_deg": [
                     [_degrees(low), _degrees(high)] for low, high in zip(freedom.lower, freedom.upper, strict=True)
                 ]

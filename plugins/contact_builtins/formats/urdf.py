@@ -15,7 +15,7 @@ from contact_builtins.formats.polygons import Polygons, surface_of
 from contact_builtins.formats.refusal import MAX_JOINTS, bounded, named, refusing
 from contact_builtins.formats.sidecar import read_sidecar, sidecar_beside
 from contact_builtins.formats.urdf_paths import MeshPaths
-from contact_builtins.formats.urdf_xml import Joint, Link, Visual, parse_urdf, turn
+from contact_builtins.formats.urdf_xml import Joint, Link, Mimic, Visual, parse_urdf, turn
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
@@ -107,9 +107,9 @@ def _joint_notes(joints: tuple[Joint, ...]) -> list[str]:
     held = [joint.name for joint in joints if joint.kind in ("prismatic", "floating", "planar")]
     if held:
         notes.append(f"Joints of a kind that is not posed here are held still: {named(held)}.")
-    coupled = [joint.name for joint in joints if joint.mimic is not None]
+    coupled = [joint.name for joint in joints if joint.mimic is not None and joint.turns]
     if coupled:
-        notes.append(f"Coupled (mimic) joints are held where the rest pose puts them: {named(coupled)}.")
+        notes.append(f"Coupled (mimic) joints turn with the joints that they mimic: {named(coupled)}.")
     unsaid = [joint.name for joint in joints if joint.unsaid]
     if unsaid:
         notes.append(
@@ -126,7 +126,10 @@ def _rig(paths: MeshPaths, links: tuple[Link, ...], joints: tuple[Joint, ...]) -
     base = next(link.name for link in links if link.name not in children)
     joint_of_link = {base: 0} | {joint.child: k + 1 for k, joint in enumerate(joints)}
     parents = np.array([-1, *(joint_of_link[joint.parent] for joint in joints)])
-    start, notes = _starting_angles(joints)
+    rules = _followers(joints)
+    limits = _coupled_limits(joints, rules)
+    start, notes = _starting_angles(joints, rules, limits)
+    hinges = {joint.name for joint in joints if joint.turns}
     local = np.array([np.eye(4), *(j.origin @ turn(j.axis, start[j.name]) for j in joints)])
     world = forward_kinematics(parents, local)
     points, faces, owner, told = _skin(paths, links, joint_of_link, world)
@@ -141,7 +144,14 @@ def _rig(paths: MeshPaths, links: tuple[Link, ...], joints: tuple[Joint, ...]) -
         faces=surface.faces,
         skin_joints=owner[surface.first_source][:, None],
         skin_weights=np.ones((len(surface.points), 1)),
-        freedoms=(JointFreedom(kind="ball", translates=True), *(_freedom(j, start[j.name]) for j in joints)),
+        freedoms=(
+            JointFreedom(kind="ball", translates=True),
+            *(
+                _freedom(j, start[j.name], limits[j.name], rule, rule is not None and rule.joint in hinges)
+                for j in joints
+                for rule in [rules.get(j.name)]
+            ),
+        ),
         up_axis="Z",
     )
     return rig, surface.source_faces, [*notes, *told, *surface.notes]
@@ -195,17 +205,58 @@ def _solid(
     return points * scale, faces if np.prod(scale) > 0 else faces[:, ::-1]
 
 
-def _starting_angles(joints: tuple[Joint, ...]) -> tuple[dict[str, float], list[str]]:
-    """Zero where the limits allow it, else just inside them; mimics follow their leader."""
-    start = {joint.name: _inside(*_limits(joint)) for joint in joints}
-    moved = [joint.name for joint in joints if start[joint.name] != 0.0]
+def _followers(joints: tuple[Joint, ...]) -> dict[str, Mimic]:
+    """By name of each coupled hinge what it turns with in the end: a hinge that mimics none, multiplier and offset.
+
+    Raises InvalidInput where that is not there, or goes in a circle.
+    """
+    by_name, result = {joint.name: joint for joint in joints}, dict[str, Mimic]()
     for joint in joints:
-        rule = joint.mimic
-        if rule is not None:
-            if rule.joint not in start:
+        rule, seen = joint.mimic, {joint.name}
+        while rule is not None:
+            if rule.joint not in by_name:
                 raise InvalidInput(f"joint {joint.name!r} mimics {rule.joint!r}, which is not there")
-            start[joint.name] = rule.multiplier * start[rule.joint] + rule.offset
+            if rule.joint in seen:
+                raise InvalidInput(f"joint {joint.name!r} mimics itself by way of {', '.join(sorted(seen))}")
+            seen.add(rule.joint)
+            result[joint.name] = rule
+            further = by_name[rule.joint].mimic
+            rule = further and Mimic(
+                further.joint,
+                rule.multiplier * further.multiplier,
+                rule.multiplier * further.offset + rule.offset,
+            )
+    return result
+
+
+def _coupled_limits(joints: tuple[Joint, ...], rules: Mapping[str, Mimic]) -> dict[str, tuple[float, float]]:
+    """Limits by joint; those of a leader keep its followers in theirs. A follower whose limits leave its leader no
+    place is not limited itself."""
+    limits = {joint.name: _limits(joint) for joint in joints}
+    for name, rule in rules.items():
+        if rule.multiplier == 0.0:
+            continue
+        ends = sorted((end - rule.offset) / rule.multiplier for end in limits[name])
+        low, high = max(limits[rule.joint][0], ends[0]), min(limits[rule.joint][1], ends[1])
+        if low < high:
+            limits[rule.joint] = low, high
+        else:
+            limits[name] = -np.inf, np.inf
+    return limits
+
+
+def _starting_angles(
+    joints: tuple[Joint, ...], rules: Mapping[str, Mimic], limits: Mapping[str, tuple[float, float]]
+) -> tuple[dict[str, float], list[str]]:
+    """Zero where the limits allow it, else just inside them; mimics follow their leader."""
+    start = {joint.name: _inside(*limits[joint.name]) for joint in joints}
+    moved = [joint.name for joint in joints if start[joint.name] != 0.0 and joint.name not in rules]
+    for name, rule in rules.items():
+        start[name] = rule.multiplier * start[rule.joint] + rule.offset
     notes = [f"Zero lies outside the limits of {named(moved)}; the rest pose starts inside."] if moved else []
+    loose = [j.name for j in joints if j.name in rules and j.limits and not np.isfinite(limits[j.name]).any()]
+    if loose:
+        notes.append(f"What {named(loose)} mimics has no place within its limits; they are not kept.")
     return start, notes
 
 
@@ -216,15 +267,18 @@ def _inside(low: float, high: float) -> float:
     return low + 0.1 * (high - low) if low > 0.0 else high - 0.1 * (high - low)
 
 
-def _freedom(joint: Joint, start: float) -> JointFreedom:
-    if not joint.turns or joint.mimic is not None:
+def _freedom(joint: Joint, start: float, limits: tuple[float, float], rule: Mimic | None, leads: bool) -> JointFreedom:
+    """leads: whether what it mimics is a hinge; a joint that mimics a slide is held as the slide is."""
+    if not joint.turns or (rule is not None and not leads):
         return JointFreedom(kind="fixed")
-    low, high = _limits(joint)
     x = joint.axis
     y = np.cross(np.eye(3)[int(np.abs(x).argmin())], x)
     y /= np.linalg.norm(y)
     frame = np.stack([x, y, np.cross(x, y)], axis=1)
-    return JointFreedom(kind="hinge", frame=frame, lower=np.array([low - start]), upper=np.array([high - start]))
+    lower, upper = (np.array([end - start]) for end in limits)
+    if rule is None:
+        return JointFreedom("hinge", frame, lower=lower, upper=upper)
+    return JointFreedom("hinge", frame, lower=lower, upper=upper, follows=rule.joint, ratio=rule.multiplier)
 
 
 def _limits(joint: Joint) -> tuple[float, float]:
