@@ -24,6 +24,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 
 BAND = 2.0  # cells
+MOST = 20_000_000  # nodes of a box
 VERSION = 1  # of the cached fields: raise it when the values change
 
 
@@ -52,6 +53,24 @@ class DistanceField:
         if settings not in kept:
             kept[settings] = cls._made(mesh, resolution, margin, f"{mesh.digest}-{settings}")
         return kept[settings]
+
+    @classmethod
+    def within(cls, mesh: TriangleMesh, low: FloatArray, high: FloatArray, spacing: float) -> DistanceField | None:
+        """The field in a box of corners (3,) alone, as fine as is wanted; None where the surface is not near it.
+
+        For a hand on a thing that is much larger than it; nothing is kept.
+        """
+        shape = tuple(int(n) for n in np.ceil((high - low) / spacing).astype(int) + 1)
+        if min(shape) < 2 or np.prod(shape, dtype=float) > MOST:
+            raise InvalidInput(f"a box needs 2 nodes a side and {MOST:.0e} in all at most, but has {shape}.")
+        if (
+            not Locator.of(mesh)
+            .closest(0.5 * (low + high)[None], max_distance=float(np.linalg.norm(high - low)))
+            .found[0]
+        ):
+            return None
+        values = _signed_distances(mesh, low, spacing, shape)
+        return cls(low, spacing, values) if np.isfinite(values).all() else None
 
     @classmethod
     def _made(cls, mesh: TriangleMesh, resolution: int, margin: float, key: str) -> DistanceField:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from contact_core.geometry.distance_field import DistanceField
 from contact_core.grasping.hand import Hand
 
 TOUCH = 0.004  # of the hand's length: nearer than this is touching
+FOUND = 0.02  # hand lengths: a digit that is farther from the object found nothing
 OPPOSE = 0.06  # hand lengths that it is worth that the thumb's side of the object is not the fingers'
 
 
@@ -79,3 +80,17 @@ def close_hands(
     whole = np.tile(np.eye(4), (n, 1, 1))
     whole[:, :3, :] = frames
     return Closed(whole, angles, starts, fits, clear, rest, palm, travel)
+
+
+def relaxed(hand: Hand, closed: Closed) -> Closed:
+    """The same hands, where fingers that found nothing are bent no farther than those that touch are on average:
+    they open again on the way on which they closed."""
+    touches = closed.clear < FOUND * hand.length
+    turned = np.add.reduceat(np.where(hand.flexes, closed.angles, 0.0), hand.bones[:-1], axis=1)  # (N, D)
+    fingers = np.arange(touches.shape[1]) != hand.thumb
+    holding = touches & fingers
+    mean = (turned * holding).sum(axis=1) / np.maximum(holding.sum(axis=1), 1)
+    share = np.clip(mean[:, None] / np.maximum(turned, 1e-9), 0.0, 1.0)
+    share = np.where(touches | ~fingers | ~holding.any(axis=1)[:, None], 1.0, share)
+    angles = closed.angles * np.where(hand.flexes, np.repeat(share, np.diff(hand.bones), axis=1), 1.0)
+    return replace(closed, angles=hand.coupled(angles))

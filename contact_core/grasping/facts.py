@@ -11,6 +11,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
 from contact_core.grasping.hand import Hand, spread_out
+from contact_core.rig.capsules import closest_on_segments
 
 FRICTION = 0.6
 CONE = 6  # edges of the pyramid in place of a friction cone
@@ -95,6 +96,47 @@ def enclosure(normals: FloatArray, weights: FloatArray) -> FloatArray:
     along = np.einsum("nki,di->nkd", normals, ways)
     along = np.where(weights[:, :, None] > 0.0, along * weights[:, :, None], -1.0)
     return np.asarray(along.max(axis=1).min(axis=1))
+
+
+def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray) -> float:
+    """Radians, 0 to pi: from how far apart the fingers that take part and the thumb or the palm press on the
+    object: of each finger the largest angle between the object's mean normal under its last bone that touches and
+    those under bones of the thumb and under the palm; of all fingers the median. Nearly pi where they oppose, half
+    of that for a hand that is laid along a thing or under it, though friction may hold it; 0 where only one side
+    touches. skin: (n, 3) posed, in the object's space; used: (D,) digits that take part."""
+    found = Locator.of(mesh).closest(skin, max_distance=TOUCHES * hand.length)
+    near = np.flatnonzero(found.found)
+    normals = mesh.face_normals[found.points.faces[near]]
+    sums = np.zeros((len(hand.joints) + 1, 3))  # the palm's last, where bone_of_skin is -1
+    np.add.at(sums, hand.bone_of_skin[near], normals)
+    stiff = np.flatnonzero(~hand.flexes)  # metacarpals are the palm's
+    sums[-1] += sums[stiff].sum(axis=0)
+    sums[stiff] = 0.0
+    size = np.linalg.norm(sums, axis=1)
+    means = sums / np.maximum(size, 1e-30)[:, None]
+    other = [-1, *(range(hand.bones[hand.thumb], hand.bones[hand.thumb + 1]) if hand.thumb >= 0 else ())]
+    against = means[[b for b in other if size[b] > 0.0]]
+    angles = []
+    for digit in np.flatnonzero(used):
+        touching = [b for b in range(hand.bones[digit], hand.bones[digit + 1]) if size[b] > 0.0]
+        if digit != hand.thumb and touching and len(against):
+            angles.append(float(np.arccos(np.clip((against @ means[touching[-1]]).min(), -1.0, 1.0))))
+    return float(np.median(angles)) if angles else 0.0
+
+
+def crossing(hand: Hand, world: FloatArray) -> float:
+    """How far bones of different digits are in one another, at most, as a share of how near they may come (their
+    capsules' radii, or how near they are at rest). world: (j, 4, 4) object_from_joint."""
+    frames = world[hand.joints]
+    ends = np.einsum("bij,bej->bei", frames[:, :3, :3], hand.capsules) + frames[:, None, :3, 3]
+    first, second = np.nonzero(np.triu(hand.room > 0.0))
+    if not len(first):
+        return 0.0
+    share = closest_on_segments(ends[first], ends[second])
+    one = ends[first, 0] + share[:, :1] * (ends[first, 1] - ends[first, 0])
+    two = ends[second, 0] + share[:, 1:] * (ends[second, 1] - ends[second, 0])
+    apart = np.linalg.norm(one - two, axis=1)
+    return float(max((1.0 - apart / hand.room[first, second]).max(), 0.0))
 
 
 def uneven_curl(hand: Hand, angles: FloatArray, used: BoolArray) -> float:

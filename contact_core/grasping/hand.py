@@ -239,9 +239,10 @@ def _coupling(rig: Rig, joints: IntArray, axes: FloatArray) -> tuple[IntArray, F
     signs = np.where(np.einsum("bi,bi->b", own, axes) < 0.0, -1.0, 1.0)
     for b, joint in enumerate(joints):
         freedom = rig.freedoms[joint]
-        lead = np.flatnonzero(joints == rig.joints.index(freedom.follows)) if freedom.follows is not None else []
-        if len(lead):
-            leads[b], ratios[b] = lead[0], freedom.ratio * signs[b] * signs[lead[0]]
+        if freedom.follows is None:
+            continue
+        for lead in np.flatnonzero(joints == rig.joints.index(freedom.follows)):
+            leads[b], ratios[b] = lead, freedom.ratio * signs[b] * signs[lead]
     return leads, ratios
 
 

@@ -20,6 +20,7 @@ FAR = 0.06  # hand lengths: a pad farther away is not on the object
 DEEP = 0.012  # hand lengths: skin this much deeper spoils a grasp
 SHALLOW = 0.004  # hand lengths that a solve makes good
 ALIKE = 0.016  # hand lengths: grasps whose hand sees the object so alike are one
+OPPOSED = np.radians(110.0)  # that fingers press from against thumb and palm; less is a hand laid on a thing
 SEEN = 160  # points of the hand from which the object is seen
 TOUCHING = 0.02  # hand lengths
 
@@ -47,6 +48,8 @@ def first_look(hand: Hand, mesh: TriangleMesh, approaches: Approaches, closed: C
     value = 1.2 * contact - fit - 0.8 * facing + 0.9 * around - 0.8 * sunk - 0.5 * palm - 0.5 * through
     value = value - 0.35 * uneven(hand, closed.angles, used) - 0.4 * straight(hand, closed.angles, used)
     value = value - np.where((around < -0.1) & (np.array(approaches.kinds) != "hook"), 0.3, 0.0)
+    laid = np.clip((OPPOSED - opposed(hand, closed, used, touched)) / (0.5 * np.pi), 0.0, 1.0)
+    value = value - 0.8 * np.where(np.array(approaches.kinds) != "hook", laid, 0.0)
     if hand.thumb >= 0:  # where it takes part, it shall touch
         value = value - np.where(used[:, hand.thumb] & ~touches[:, hand.thumb], 0.5, 0.0)
     return np.where(np.isfinite(closed.travel), value, -np.inf)
@@ -68,6 +71,29 @@ def bones_crossing(hand: Hand, mesh: TriangleMesh, closed: Closed) -> IntArray:
     crossed = np.zeros(len(way), bool)
     crossed[real] = Locator.of(mesh).cast(start[real], way[real], max_distance=1.0).found
     return np.asarray(crossed.reshape(len(closed.placed), -1).sum(axis=1))
+
+
+def opposed(hand: Hand, closed: Closed, used: BoolArray, touched: BoolArray) -> FloatArray:
+    """(N,) radians: `facts.opposition` as pads tell it. used: (N, D); touched: (N, B + 1) which pads are on the
+    object, and the palm."""
+    bones, n = len(hand.joints), len(closed.placed)
+    palm = np.broadcast_to(-closed.placed[:, :3, :3] @ hand.frame[:, 0], (n, 3))[:, None]
+    normals = np.concatenate([closed.fits[:, :, 2:5], palm], axis=1)
+    thumb = np.zeros(bones + 1, bool)
+    thumb[-1] = True
+    if hand.thumb >= 0:
+        thumb[hand.bones[hand.thumb] : hand.bones[hand.thumb + 1]] = True
+    along = np.einsum("nbi,nci->nbc", normals, normals)
+    along = np.where((thumb & touched)[:, None, :], along, 1.0).min(axis=2)  # (N, B + 1)
+    angles = np.full(used.shape, np.nan)
+    for digit in range(used.shape[1]):
+        for b in range(hand.bones[digit], hand.bones[digit + 1]):  # the last that touches counts
+            if digit != hand.thumb and hand.has_pad[b]:
+                here = touched[:, b] & used[:, digit]
+                angles[here, digit] = np.arccos(np.clip(along[here, b], -1.0, 1.0))
+    none = np.isnan(angles).all(axis=1)
+    angles[none] = 0.0
+    return np.asarray(np.nanmedian(angles, axis=1))
 
 
 def uneven(hand: Hand, angles: FloatArray, used: BoolArray) -> FloatArray:

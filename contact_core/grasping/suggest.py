@@ -22,13 +22,15 @@ from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
-from contact_core.grasping.closing import Closed, close_hands
+from contact_core.grasping.closing import Closed, close_hands, relaxed
 from contact_core.grasping.facts import (
     clearance,
     closure,
     comfort,
     contact_wrenches,
+    crossing,
     digits_in_contact,
+    opposition,
     skin_through,
     uneven_curl,
 )
@@ -64,6 +66,7 @@ SECOND_LOOK = 220  # approaches that are closed with all starts of the thumb
 MORE = {"power": 3.0}  # times as many approaches of a kind as of others
 TURNS = ("power", "power", "precision", "power", "pinch", "power", "hook")  # one after the other
 WORSE, HOPELESS = 1.1, -0.6  # a first look that is worse than the best by so much, and below that, is not tried
+NEAR_CELL, NEAR_ROOM = 0.02, 0.12  # hand lengths: of a field round one hand, and how far beyond its skin it goes
 FILLED = 0.2  # hand lengths: what a ball of this radius does not reach is filled
 OUTSIDE = 0.015  # hand lengths: a closed hand that is no deeper in the filled object keeps out of all of it
 UNFIT = 0.03  # hand lengths from its place, after solving, at which a proposed pad is given up
@@ -176,10 +179,19 @@ class GraspScene:
         """The object with its hollows filled (`filled`)."""
         return filled(self.field, FILLED * self.hand.length)
 
-    def terms(self, whole: bool) -> tuple[PoseTerm, ...]:
-        """The paper's, depth, and self-collision where a plugin offers it. whole: hollows are solid, too."""
+    def near(self, skin: FloatArray) -> DistanceField:
+        """The field round skin of the hand (n, 3): where the object is so large that its own is too coarse, a finer
+        one of that part."""
+        fine = NEAR_CELL * self.hand.length
+        if self.field.spacing <= fine:
+            return self.field
+        room = NEAR_ROOM * self.hand.length
+        part = DistanceField.within(self.mesh, skin.min(axis=0) - room, skin.max(axis=0) + room, fine)
+        return part or self.field
+
+    def terms(self, kept: DistanceField) -> tuple[PoseTerm, ...]:
+        """The paper's, depth in what is kept out of, and self-collision where a plugin offers it."""
         result: tuple[PoseTerm, ...] = paper_terms()
-        kept = self.solid if whole else self.field
         scale = uniform_scale_of(self)
         own = DistanceField(kept.origin / scale, kept.spacing / scale, kept.values / scale)
         result += (KeepOutTerm(weight=PENETRATION, resolution=48, fields={self.object_name: own}),)
@@ -187,16 +199,18 @@ class GraspScene:
             result += (self.plugins.make(POSE_TERMS, "self-collision"),)
         return result
 
-    def settings(self, whole: bool) -> SolveSettings:
-        """How grasps are solved: from the closed hand, digits and root free, a body's other joints as they are.
-
-        whole: whether the object's hollows are solid, too.
+    def settings(self, kept: DistanceField, closed: Pose) -> SolveSettings:
+        """How grasps are solved: from the closed hand and near it, digits and root free, a body's other joints as
+        they are. kept: what it keeps out of. closed: the pose that digits without a contact keep.
         """
         rig = self.rig
         moving = [rig.joints[j] for j in {*np.flatnonzero(rig.parents < 0).tolist(), *self.hand.joints.tolist()}]
-        objective = Objective(
-            self.terms(whole), free={self.hand_name: moving}, prior=self.prior, length=self.hand.length
-        )
+        local = closed.local.copy()
+        if self.hand.thumb >= 0:  # its root strives back: what it was searched over stretches the skin there
+            first = self.hand.joints[self.hand.firsts[self.hand.thumb]]
+            local[first] = rig.rest_local[first]
+        prior = {self.hand_name: Pose(closed.joints, local)} if self.prior == "rest" else self.prior
+        objective = Objective(self.terms(kept), free={self.hand_name: moving}, prior=prior, length=self.hand.length)
         return SolveSettings(objective=objective, options=SolveOptions(candidates=AGAIN, max_iterations=60))
 
 
@@ -262,9 +276,10 @@ def uniform_scale_of(scene: GraspScene) -> float:
 
 
 def _closed(hand: Hand, field: DistanceField, approaches: Approaches) -> Closed:
-    return close_hands(
+    closed = close_hands(
         hand, field, approaches.placed, approaches.ways, approaches.bars, approaches.curls, approaches.limits
     )
+    return relaxed(hand, closed)
 
 
 def _shared_out(approaches: Approaches, values: FloatArray, most: int) -> IntArray:
@@ -312,7 +327,8 @@ def _finished(
     hand, draft = scene.hand, base.copy()
     world = world_from_surface(scene.document, scene.hand_name)
     in_rig = np.linalg.inv(world) @ np.linalg.inv(scene.object_from_world) @ closed.placed[0]
-    draft.surfaces.set_pose(scene.hand_name, hand.pose(in_rig, closed.angles[0], closed.starts[0]))
+    start = hand.pose(in_rig, closed.angles[0], closed.starts[0])
+    draft.surfaces.set_pose(scene.hand_name, start)
     wanted = _taking_part(scene, approach, pads)
     return finished(scene, draft, wanted, proposed, approach.kinds[0], approach.limits[0] >= 1.0, score)
 
@@ -334,25 +350,32 @@ def finished(
     left_out = _place(scene, draft, wanted)
     if len(wanted) - len(left_out) < 2:
         return None
-    deepest = scene.solid.distances(_stands(scene, draft)[1].points).min()
-    whole = bool(deepest > -OUTSIDE * scene.hand.length)
+    kept = _kept_out_of(scene, _stands(scene, draft)[1].points)
+    start = draft.document.poses[scene.hand_name]
     try:
-        solution = _settled(scene, draft, whole)
+        solution = _settled(scene, draft, kept, start)
         if proposed and (bad := _unfit(scene, solution)) and len(draft.document.pairs) - len(bad) >= 2:
             for name, why in bad.items():
                 target = draft.document.pairs[name].object
                 draft.pairs.remove(name)
                 draft.patches.remove(target)
                 left_out[name] = why
-            solution = _settled(scene, draft, whole)
+            solution = _settled(scene, draft, kept, start)
     except InvalidInput:
         return None
     return judged(scene, draft, solution, kind, used, left_out, len(wanted), proposed, score)
 
 
-def _settled(scene: GraspScene, draft: Draft, whole: bool) -> PoseSolution:
+def _kept_out_of(scene: GraspScene, skin: FloatArray) -> DistanceField:
+    """The object near the closed hand's skin (n, 3), its hollows filled where the hand does not reach into them."""
+    own = scene.near(skin[np.concatenate(scene.hand.skin_of_digits)])
+    solid = scene.solid if own is scene.field else filled(own, FILLED * scene.hand.length)
+    return solid if solid.distances(skin).min() > -OUTSIDE * scene.hand.length else own
+
+
+def _settled(scene: GraspScene, draft: Draft, kept: DistanceField, closed: Pose) -> PoseSolution:
     """Solve, contacts to where they then face the object, solve again; the better of both."""
-    settings = scene.settings(whole)
+    settings = scene.settings(kept, closed)
     found = settle(draft.document, draft.copy(), scene.plugins, scene.revision, settings, rounds=1)
     draft.do(found.command)
     return found.after
@@ -462,6 +485,8 @@ def judged(
         "thumb_in_contact": bool(hand.thumb < 0 or not used[hand.thumb] or touching[hand.thumb]),
         "skin_through": float(skin_through(hand, posed.points, world, scene.mesh).max()) / hand.length,
         "uneven_curl_deg": float(np.degrees(uneven_curl(hand, angles, used & touching))),
+        "opposition_deg": float(np.degrees(opposition(hand, posed.points, scene.mesh, used))),
+        "crossing": crossing(hand, world),
         "closure": closure(contact_wrenches(posed, scene.mesh, hand.length)),
     }
     verdict = judge(metrics, {} if proposed else left_out, {})

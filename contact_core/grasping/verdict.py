@@ -101,8 +101,10 @@ def judge(metrics: Mapping[str, Any], left_out: Mapping[str, str], accept: Mappi
 DIGITS = {"power": 3, "precision": 3, "hook": 2, "lateral": 2, "pinch": 2}
 CLOSURE = {"power": 0.02, "precision": 0.01, "pinch": 0.0, "hook": -np.inf, "lateral": -np.inf}
 PADS_PLACED = {"power": 0.5, "precision": 0.6, "pinch": 0.6, "hook": 0.4, "lateral": 0.5}
+OPPOSED = {"power": 100.0, "precision": 100.0, "pinch": 110.0, "lateral": 80.0, "hook": -np.inf}  # degrees
 SKIN_THROUGH = 0.025
-UNEVEN = 75.0  # degrees
+UNEVEN = 65.0  # degrees
+CROSSING = 0.35  # of how near bones of two digits may come
 
 
 def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
@@ -118,6 +120,13 @@ def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
         failures.append(f"only {share} found a place, a {kind} grasp wants {100 * PADS_PLACED[kind]:.0f} %")
     if metrics["closure"] < CLOSURE[kind]:
         failures.append("the contacts do not hold the object: it would slip or turn out of the hand")
+    if metrics["opposition_deg"] < OPPOSED[kind]:
+        failures.append(
+            "the hand is laid on the object and does not close round it: fingers press from"
+            f" {metrics['opposition_deg']:.0f} degrees against thumb and palm, wanted >= {OPPOSED[kind]:.0f}"
+        )
+    if metrics["crossing"] > CROSSING:
+        failures.append(f"two digits go {100 * metrics['crossing']:.0f} % into one another")
     if metrics["skin_through"] > SKIN_THROUGH:
         deep = f"{100 * metrics['skin_through']:.1f} % of the hand's length"
         failures.append(

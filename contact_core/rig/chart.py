@@ -39,8 +39,8 @@ class Chart:
 
     joint_of_dof: (d,) which joint. is_translation: (d,). lower, upper: (d,) limits, offsets from rest.
     dof_names: "index_1.x" (hinge, ball, Euler turns), "wrist.tx" (translations).
-    leaders, followers, ratios: (f,) dofs of which the second turn by so many times as much as the first. A follower is
-    locked, for no solve chooses it; what it may bend limits its leader.
+    leaders, followers, ratios: (f,) dofs of which the second turn by so many times as much as the first. A
+    follower is locked, for no solve chooses it; what it may bend limits its leader.
     """
 
     def __init__(self, rig: Rig, world_from_rig: FloatArray | None = None) -> None:
@@ -123,7 +123,7 @@ class Chart:
         self.locked[self.followers] = True
         for leader, follower, ratio in pairs:
             if ratio != 0.0:
-                ends = sorted((self.lower[follower] / ratio, self.upper[follower] / ratio))
+                ends = sorted((float(self.lower[follower]) / ratio, float(self.upper[follower]) / ratio))
                 self.lower[leader] = max(self.lower[leader], min(ends[0], 0.0))
                 self.upper[leader] = min(self.upper[leader], max(ends[1], 0.0))
 

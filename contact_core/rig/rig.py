@@ -138,11 +138,13 @@ class Rig:
             )
 
     def _check_followers(self) -> None:
-        free = {n for n, f in zip(self.joints, self.freedoms, strict=True) if f.kind == "hinge" and f.follows is None}
+        free = {
+            n for n, f in zip(self.joints, self.freedoms, strict=True) if f.kind == "hinge" and f.follows is None
+        }
         for name, freedom in zip(self.joints, self.freedoms, strict=True):
             if freedom.follows is not None and freedom.follows not in free:
                 raise InvalidInput(
-                    f"joint {name!r} follows {freedom.follows!r}, which has to be a hinge of the rig that follows none."
+                    f"joint {name!r} follows {freedom.follows!r}, which has to be a hinge that follows none."
                 )
 
     def joint_index(self, name: str) -> int:
@@ -215,8 +217,8 @@ class Rig:
 
 
 def still_following(joints: Sequence[str], freedoms: Sequence[JointFreedom]) -> tuple[JointFreedom, ...]:
-    """The freedoms of joints, where those that follow a joint which is no longer there, or no hinge, are held: a host
-    may have renamed it."""
+    """The freedoms of joints, where those that follow a joint which is no longer there, or no hinge, are held: a
+    host may have renamed it."""
     free = {n for n, f in zip(joints, freedoms, strict=True) if f.kind == "hinge" and f.follows is None}
     return tuple(f if f.follows is None or f.follows in free else JointFreedom("fixed") for f in freedoms)
 

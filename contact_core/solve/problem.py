@@ -313,7 +313,9 @@ class PoseProblem:
     def fields_of_body(self) -> tuple[IntArray, ...]:
         """Per body, the dofs of its chart that theta moves: the free ones, then those that follow them."""
         return tuple(
-            np.concatenate([free, chart.followers[np.isin(chart.leaders, free)]]) if isinstance(chart, Chart) else free
+            np.concatenate([free, chart.followers[np.isin(chart.leaders, free)]])
+            if isinstance(chart, Chart)
+            else free
             for chart, free in zip(self.charts, self.free_of_body, strict=True)
         )
 

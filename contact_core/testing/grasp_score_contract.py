@@ -32,6 +32,8 @@ GOOD: dict[str, Any] = {
     "thumb_in_contact": True,
     "skin_through": 0.005,
     "uneven_curl_deg": 15.0,
+    "opposition_deg": 150.0,
+    "crossing": 0.0,
     "closure": 0.1,
 }
 

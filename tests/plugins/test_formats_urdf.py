@@ -58,9 +58,12 @@ def test_hinges_limits_mimics_and_slides(tmp_path: Path) -> None:
 
 
 def test_mimics_of_mimics_and_circles(tmp_path: Path) -> None:
-    chain = PARTS.replace('<link name="c">', '<link name="d"/><link name="c">') + """
+    chain = (
+        PARTS.replace('<link name="c">', '<link name="d"/><link name="c">')
+        + """
       <joint name="last" type="revolute"><parent link="c"/><child link="d"/><axis xyz="0 0 1"/>
         <mimic joint="follow" multiplier="-0.5" offset="1"/><limit lower="-0.5" upper="9"/></joint>"""
+    )
     rig = read(tmp_path, chain).rig
     assert rig is not None and (rig.freedoms[4].follows, rig.freedoms[4].ratio) == ("out", -1.0)
     start = 0.4 + 0.1 * (1.4 - 0.4)  # last = 0.95 - out may be -0.5: out up to 1.45, its own limit is nearer

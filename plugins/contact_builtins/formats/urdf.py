@@ -267,7 +267,9 @@ def _inside(low: float, high: float) -> float:
     return low + 0.1 * (high - low) if low > 0.0 else high - 0.1 * (high - low)
 
 
-def _freedom(joint: Joint, start: float, limits: tuple[float, float], rule: Mimic | None, leads: bool) -> JointFreedom:
+def _freedom(
+    joint: Joint, start: float, limits: tuple[float, float], rule: Mimic | None, leads: bool
+) -> JointFreedom:
     """leads: whether what it mimics is a hinge; a joint that mimics a slide is held as the slide is."""
     if not joint.turns or (rule is not None and not leads):
         return JointFreedom(kind="fixed")

@@ -42,6 +42,25 @@ def test_distance_field_gradient_is_its_derivative(seed: int) -> None:
     assert all(len(empty) == 0 for empty in field.sample(points[:0]))
 
 
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=10, deadline=None)
+def test_a_field_within_a_box_is_the_whole_one_there(seed: int) -> None:
+    mesh = cached_family("torus")
+    random = np.random.default_rng(seed)
+    middle = mesh.points[random.integers(len(mesh.points))] + random.normal(0.0, 0.1, 3)
+    part = DistanceField.within(mesh, middle - 0.4, middle + 0.4, 0.04)
+    assert part is not None
+    points = middle + random.uniform(-0.35, 0.35, (200, 3))
+    near = Locator.of(mesh).closest(points)
+    sign = np.where(Locator.of(mesh).winding_number(points) > 0.5, -1.0, 1.0)
+    exact = sign * near.distance
+    shallow = np.abs(exact) < 0.25  # farther in, what is nearest may lie outside of the box
+    assert np.abs(part.distances(points) - exact)[shallow].max(initial=0.0) < 0.06
+    assert DistanceField.within(mesh, middle + 50.0, middle + 51.0, 0.1) is None
+    with pytest.raises(InvalidInput, match="at most"):
+        DistanceField.within(mesh, middle - 1.0, middle + 1.0, 1e-4)
+
+
 def test_distance_field_converges_and_knows_inside_from_outside() -> None:
     mesh = meshes.icosphere(3)
     points = np.random.default_rng(0).uniform(-1.2, 1.2, (400, 3))

@@ -3,12 +3,14 @@ poses."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.grasping.closing import TOUCH, Closed, close_hands
+from contact_core.grasping.closing import FOUND, TOUCH, Closed, close_hands, relaxed
 from contact_core.grasping.hand import Hand
 from contact_core.rig.rig import forward_kinematics
 from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
@@ -104,3 +106,32 @@ def test_fingers_keep_out_of_one_another() -> None:
         pairs = (one.room > 0.0) & fingers[:, None] & fingers[None]
         deepest = max(deepest, float((one.room - gap)[pairs].max()))
     assert deepest < step + 0.02 * one.length
+
+
+def test_fingers_that_found_nothing_are_bent_no_farther_than_those_that_did() -> None:
+    closed, one = closed_on("rod"), hand()
+    eased = relaxed(one, closed)
+    touches = closed.clear < FOUND * one.length
+    fingers = np.arange(len(one.bones) - 1) != one.thumb
+    lost = 0
+    for n in range(N):
+        before, after = one.turned(closed.angles[n]), one.turned(eased.angles[n])
+        assert np.allclose(before[touches[n]], after[touches[n]]) and (after <= before + 1e-12).all()
+        if (touches[n] & fingers).any():
+            mean = before[touches[n] & fingers].mean()
+            assert (after[~touches[n] & fingers] <= mean + 1e-9).all()
+            lost += int((before[~touches[n] & fingers] > mean).sum())
+    assert lost, "some finger of some hand went past the rod"
+
+
+def test_coupled_bones_close_by_their_rule() -> None:
+    one = hand()
+    middle, last = int(one.bones[2]) - 2, int(one.bones[2]) - 1
+    leads = one.leads.copy()
+    leads[last] = middle
+    robot = replace(one, leads=leads, ratios=np.full(len(leads), 0.6))
+    mesh = thing("ball")
+    placed, ways = placements(robot, mesh)
+    closed = close_hands(robot, DistanceField.of(mesh, resolution=40), placed, ways)
+    assert np.allclose(closed.angles[:, last], 0.6 * closed.angles[:, middle])
+    assert (closed.angles[:, middle] > 0.2).any() and (closed.clear[:, 1] < TOUCH * one.length).any()

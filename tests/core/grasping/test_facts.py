@@ -7,12 +7,22 @@ import pytest
 
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
-from contact_core.grasping.facts import closure, contact_wrenches, digits_in_contact, enclosure, skin_through
+from contact_core.grasping.closing import close_hands
+from contact_core.grasping.facts import (
+    closure,
+    contact_wrenches,
+    crossing,
+    digits_in_contact,
+    enclosure,
+    opposition,
+    skin_through,
+)
+from contact_core.grasping.hand import Hand
 from contact_core.grasping.slots import KINDS
 from contact_core.grasping.verdict import judge_hold
-from contact_core.rig.rig import skin
+from contact_core.rig.rig import forward_kinematics, skin
 from contact_core.testing import meshes
-from contact_core.testing.grasp_sampler_contract import hand
+from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
 from contact_core.testing.grasp_score_contract import GOOD
 
 
@@ -79,6 +89,51 @@ def test_digits_that_touch_are_counted() -> None:
     assert touching[1] and touching.sum() == 1
 
 
+def test_a_flat_hand_on_a_plate_does_not_oppose_and_one_round_a_ball_does() -> None:
+    one = hand()
+    used = np.ones(len(one.bones) - 1, bool)
+    flat = skin(one.rig, one.rig.rest_world)
+    palm = one.description.palm
+    away = (flat - palm.point) @ palm.normal
+    skin_of_fingers = np.concatenate(one.skin_of_digits[1:])
+    plate = meshes.plane(8)
+    across = np.stack([one.frame[:, 1], one.frame[:, 2], -palm.normal])
+    low = palm.point + away[skin_of_fingers].max() * palm.normal
+    under = TriangleMesh(4.0 * one.length * (plate.points - [0.5, 0.5, 0.0]) @ across + low, plate.faces)
+    assert opposition(one, flat, under, used) < np.radians(30.0)
+    mesh = thing("ball")
+    request = request_for("ball")
+    closed = close_hands(one, request.field, *around(one, mesh))
+    angles = []
+    for n in range(len(closed.placed)):
+        pose = one.pose(closed.placed[n], closed.angles[n], closed.starts[n])
+        posed = skin(one.rig, forward_kinematics(one.rig.parents, pose.local))
+        angles.append(opposition(one, posed, mesh, used))
+    assert max(angles) > np.radians(120.0)
+    assert opposition(one, flat + 100.0 * one.length, mesh, used) == 0.0
+
+
+def around(one: Hand, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+    """A few hands that come to the middle of a mesh, its middle below the fingers."""
+    placed = np.tile(np.eye(4), (6, 1, 1))
+    for n, along in enumerate(np.linspace(0.05, 0.3, 6)):
+        placed[n, :3, 3] = (
+            mesh.points.mean(axis=0) - one.description.palm.point - 0.5 * one.length * one.frame[:, 0]
+        )
+        placed[n, :3, 3] -= along * one.length * one.frame[:, 1]
+    return placed, np.tile(one.frame[:, 0], (6, 1))
+
+
+def test_digits_at_rest_do_not_cross_and_those_that_spread_through_one_another_do() -> None:
+    one = hand()
+    assert crossing(one, one.rig.rest_world) == 0.0
+    world = one.rig.rest_world.copy()
+    first, second = one.bones[2], one.bones[3]
+    moved = one.joints[second : one.bones[4]]
+    world[moved, :3, 3] += world[one.joints[first], :3, 3] - world[one.joints[second], :3, 3]
+    assert crossing(one, world) > 0.5
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_good_hold_has_no_failure_and_each_fault_is_named(kind: str) -> None:
     assert judge_hold(GOOD, kind) == ()
@@ -88,7 +143,10 @@ def test_a_good_hold_has_no_failure_and_each_fault_is_named(kind: str) -> None:
         "pads_placed": (0.1, "pads"),
         "skin_through": (0.06, "wall"),
         "uneven_curl_deg": (150.0, "bent"),
+        "crossing": (0.6, "into one another"),
     }
+    if kind != "hook":
+        faults["opposition_deg"] = (60.0, "laid on the object")
     for key, (value, word) in faults.items():
         told = judge_hold({**GOOD, key: value}, kind)
         assert len(told) == 1 and word in told[0], (key, told)

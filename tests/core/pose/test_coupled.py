@@ -1,4 +1,4 @@
-"""Coupled hinges (a robot's mimic joints): one dof, exact gradients, the limits of both, poses that keep the rule."""
+"""Coupled hinges (a robot's mimic joints): one dof, exact gradients, the limits of both, poses that keep it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_gradients_and_gauss_newton_know_the_coupling(ratio: float, other: float
 @given(st.sampled_from([(0.7, -1.4), (1.0, 1.0), (2.5, 0.0), (-0.5, -3.0)]), st.integers(0, 1000))
 def test_a_solved_pose_keeps_the_rule_and_the_limits_of_both(ratios: tuple[float, float], seed: int) -> None:
     rig = coupled_rig(*ratios)
-    problem, planted = rigs.planted(rig, seed)
+    problem, _ = rigs.planted(rig, seed)
     solution = LevenbergMarquardt().solve(problem, SolveOptions())
     rule_holds(rig, solution.poses[rig.name], *ratios)
     assert rigs.mean_gap(problem, solution.theta) < 0.1 * problem.unit
