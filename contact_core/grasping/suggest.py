@@ -126,7 +126,8 @@ class GraspSettings:
 @dataclass(frozen=True, eq=False)
 class GraspScene:
     """The document, its hand and its object, and what solves there. hand_name, object_name: of their surfaces.
-    prior: what draws the digits that touch nothing: the rig's rest, or the pose from which a solve starts."""
+    prior: what draws the digits that touch nothing: the closed hand with its thumb's root at rest ("closed"), or
+    the pose from which a solve starts ("current")."""
 
     document: ContactDocument
     derived: Derived
@@ -137,7 +138,7 @@ class GraspScene:
     plugins: PluginManager
     revision: int = 0
     evaluated: Mapping[str, HostRig] | None = None
-    prior: Literal["rest", "current"] = "rest"
+    prior: Literal["closed", "current"] = "closed"
 
     @property
     def rig(self) -> Rig:
@@ -205,13 +206,17 @@ class GraspScene:
         """
         rig = self.rig
         moving = [rig.joints[j] for j in {*np.flatnonzero(rig.parents < 0).tolist(), *self.hand.joints.tolist()}]
-        local = closed.local.copy()
-        if self.hand.thumb >= 0:  # its root strives back: what it was searched over stretches the skin there
-            first = self.hand.joints[self.hand.firsts[self.hand.thumb]]
-            local[first] = rig.rest_local[first]
-        prior = {self.hand_name: Pose(closed.joints, local)} if self.prior == "rest" else self.prior
+        prior = self.prior if self.prior == "current" else {self.hand_name: self._drawn_to(closed)}
         objective = Objective(self.terms(kept), free={self.hand_name: moving}, prior=prior, length=self.hand.length)
         return SolveSettings(objective=objective, options=SolveOptions(candidates=AGAIN, max_iterations=60))
+
+    def _drawn_to(self, closed: Pose) -> Pose:
+        """The closed hand with its thumb's first joint at rest: what that was searched over stretches the skin."""
+        if self.hand.thumb < 0:
+            return closed
+        first, local = self.hand.joints[self.hand.firsts[self.hand.thumb]], closed.local.copy()
+        local[closed.joints.index(self.rig.joints[first])] = self.rig.rest_local[first]
+        return Pose(closed.joints, local)
 
 
 def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_PROGRESS) -> Iterator[Suggestion]:
