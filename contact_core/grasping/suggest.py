@@ -126,7 +126,7 @@ class GraspSettings:
 @dataclass(frozen=True, eq=False)
 class GraspScene:
     """The document, its hand and its object, and what solves there. hand_name, object_name: of their surfaces.
-    prior: what draws the digits that touch nothing: the closed hand with its thumb's root at rest ("closed"), or
+    prior: what draws the digits that touch nothing: the closed hand with its thumb at rest ("closed"), or
     the pose from which a solve starts ("current")."""
 
     document: ContactDocument
@@ -211,11 +211,12 @@ class GraspScene:
         return SolveSettings(objective=objective, options=SolveOptions(candidates=AGAIN, max_iterations=60))
 
     def _drawn_to(self, closed: Pose) -> Pose:
-        """The closed hand with its thumb's first joint at rest: what that was searched over stretches the skin."""
+        """The closed hand with its thumb at rest: what its root was searched over stretches the skin there."""
         if self.hand.thumb < 0:
             return closed
-        first, local = self.hand.joints[self.hand.firsts[self.hand.thumb]], closed.local.copy()
-        local[closed.joints.index(self.rig.joints[first])] = self.rig.rest_local[first]
+        local = closed.local.copy()
+        for joint in self.hand.joints[self.hand.bones[self.hand.thumb] : self.hand.bones[self.hand.thumb + 1]]:
+            local[closed.joints.index(self.rig.joints[joint])] = self.rig.rest_local[joint]
         return Pose(closed.joints, local)
 
 

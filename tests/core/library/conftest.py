@@ -15,7 +15,7 @@ from contact_core.library.verbs import library_scene
 from contact_core.plugins.manager import PluginManager
 from contact_core.session import Session
 
-SETTINGS = GraspSettings(count=1, kinds=("power",), sampler_settings={"places": 30, "most": 160})
+SETTINGS = GraspSettings(count=1, kinds=("power",), sampler_settings={"places": 60, "most": 320})
 
 
 @pytest.fixture(scope="package")
