@@ -33,9 +33,9 @@ from contact_core.arrays import FloatArray
 from contact_core.geometry.inside import depth_inside
 from contact_core.geometry.transform import transform_points
 from contact_core.job.job import Job
-from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare, settings_of
 from contact_core.plugins.manager import PluginManager
+from contact_core.recipe.reader import load_recipe
 from contact_core.rig.rig import skin
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem

@@ -21,9 +21,9 @@ from contact_core.arrays import FloatArray
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.transform import transform_points
-from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
+from contact_core.recipe.reader import load_recipe
 from contact_core.rig.poses import blend
 from contact_core.rig.rig import skin
 from contact_core.scene.picture import Picture, PictureMesh

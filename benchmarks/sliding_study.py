@@ -15,13 +15,13 @@ from harness import record
 import contact_builtins
 from contact_builtins.demos import demo_recipe
 from contact_core.job.job import Job
-from contact_core.job.recipe import Recipe
-from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import perform
 from contact_core.plugins.manager import PluginManager
 from contact_core.proposals import PENALTY, SLACK
 from contact_core.proposals.draft import Draft
 from contact_core.proposals.proposal import SolveSettings, slide
+from contact_core.recipe.reader import load_recipe
+from contact_core.recipe.recipe import Recipe
 from contact_core.scene.problem import Objective
 
 HERE = Path(__file__).resolve().parent

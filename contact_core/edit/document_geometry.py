@@ -87,6 +87,12 @@ class DocumentGeometry:
             raise InvalidInput(f"the rig of {surface!r} is not loaded: give it to the session by surfaces.add.")
         return self.mesh(surface).with_points(posed_points(rig, pose))
 
+    def surface_from_surface(self, there: str, here: str) -> FloatArray:
+        """(4, 4) from the space of a surface, at rest, into that of another, each in its own units."""
+        one, other = self.document.surface(here), self.document.surface(there)
+        scale = np.diag([*[one.meters_per_unit / other.meters_per_unit] * 3, 1.0])
+        return np.asarray(np.linalg.inv(other.world_from_surface) @ scale @ one.world_from_surface)
+
     def touching(
         self, surface: str, other: str, distance: float, *, facing: bool = True, smallest: int = 3
     ) -> list[SurfacePoints]:
@@ -95,10 +101,8 @@ class DocumentGeometry:
         What to paint when a coarse pose came first (workflow (e) of the paper). facing: nothing reaches through
         the far wall of a cup. smallest: parts of fewer vertices are left out.
         """
-        here, there = self.document.surface(surface), self.document.surface(other)
-        ratio = here.meters_per_unit / there.meters_per_unit
-        scale = np.diag([ratio, ratio, ratio, 1.0])
-        move = np.linalg.inv(there.world_from_surface) @ scale @ here.world_from_surface
+        ratio = self.document.surface(surface).meters_per_unit / self.document.surface(other).meters_per_unit
+        move = self.surface_from_surface(other, surface)
         vertices, _ = touching_vertices(
             self.posed_mesh(surface), self.mesh(other), distance * ratio, other_from_posed=move, facing=facing
         )

@@ -41,8 +41,8 @@ class RecipeJob:
 
     def run(self, request: JobRequest, plugins: PluginManager, progress: Progress) -> JobOutcome:
         """The job of `contact pose`, by the batch's solver where it names one."""
-        from contact_core.job.recipe_reader import load_recipe
         from contact_core.job.run import run
+        from contact_core.recipe.reader import load_recipe
 
         if request.frames is not None:
             raise InvalidInput("a recipe has no frames; leave --frames out, or give shots.")

@@ -25,12 +25,13 @@ from contact_core.grasping.suggest import GraspScene, GraspSettings, Suggestion,
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.grasping.verdict import DEFINITIONS, spell
 from contact_core.hands.description import HandWords
-from contact_core.job.inputs import object_mesh
-from contact_core.job.recipe import AssetSource, ObjectSpec
+from contact_core.job.standing import object_mesh
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import read_asset
-from contact_core.plugins.registry import FORMATS, RENDERERS
+from contact_core.plugins.registry import RENDERERS
+from contact_core.plugins.writing import write_model
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.recipe.recipe import AssetSource, ObjectSpec
 from contact_core.rig.pose_files import save_pose
 from contact_core.rig.rig import Pose
 from contact_core.scene.picture import Picture, PictureMesh
@@ -152,11 +153,8 @@ def _write_one(job: GraspJob, one: Suggestion, stage: Path, names: dict[str, str
     pose = document.poses[HAND]
     write_atomic(stage / names["document"], dump_document(document))
     save_pose(stage / names["pose"], pose, rig=job.session.rigs[HAND].name)
-    writers = [f for f in plugins.offers(FORMATS).values() if f.can_write and ".glb" in f.suffixes]
-    if writers:
-        standing = Pose((job.object.name,), np.eye(4)[None])
-        poses = {job.hand.name: pose, job.object.name: standing}
-        writers[0].write(stage / names["model"], [job.hand, job.object], poses)
+    poses = {job.hand.name: pose, job.object.name: Pose((job.object.name,), np.eye(4)[None])}
+    write_model(stage / names["model"], [job.hand, job.object], poses, plugins)
 
 
 def _draw(

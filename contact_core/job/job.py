@@ -12,8 +12,8 @@ from typing import Any
 from contact_core.document.asset import Asset
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.grasping.verdict import Verdict
-from contact_core.job.recipe import PatchSpec, Recipe
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.recipe.recipe import PatchSpec, Recipe
 from contact_core.rig.rig import Pose
 from contact_core.session import Session
 from contact_core.solve.body import manipulator_length

@@ -15,13 +15,13 @@ from contact_core.atomic_set import replacing_set
 from contact_core.document.schema import dump_document
 from contact_core.errors import InvalidInput
 from contact_core.grasping.verdict import DEFINITIONS, SCHEMA, table
-from contact_core.job.inputs import inputs_of
 from contact_core.job.job import Job, JobResult
 from contact_core.job.pictures import pictures_of
-from contact_core.job.recipe import Recipe
 from contact_core.plugins.drawing import draw
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import FORMATS
+from contact_core.plugins.writing import write_model
+from contact_core.recipe.recipe import Recipe
+from contact_core.recipe.sources import inputs_of
 from contact_core.rig.pose_files import save_pose
 from contact_core.rig.poses import moved_roots
 from contact_core.rig.rig import Pose
@@ -81,10 +81,6 @@ def _draw(job: Job, pictures: list[Picture], path: Path, plugins: PluginManager)
 
 def _write_model(job: Job, path: Path, plugins: PluginManager) -> None:
     """A model with every manipulator in its pose and every object where it lies, by the format that writes .glb."""
-    writers = [f for f in plugins.offers(FORMATS).values() if f.can_write and ".glb" in f.suffixes]
-    if not writers:
-        job.notes.append("no plugin writes .glb, so there is no posed model.")
-        return
     document = job.session.document
     poses: dict[str, Pose] = {}
     for name, asset in job.assets.items():
@@ -92,7 +88,8 @@ def _write_model(job: Job, path: Path, plugins: PluginManager) -> None:
         poses[asset.name] = Pose((asset.name,), world[None])
         if asset.rig is not None:
             poses[asset.name] = moved_roots(asset.rig, document.poses[name], world)
-    writers[0].write(path, list(job.assets.values()), poses)
+    if not write_model(path, list(job.assets.values()), poses, plugins):
+        job.notes.append("no plugin writes .glb, so there is no posed model.")
 
 
 def scene_of(job: Job) -> MemoryScene:

@@ -10,10 +10,9 @@ from scipy.spatial import cKDTree
 
 from contact_core.arrays import FloatArray
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.transform import transform_points
 from contact_core.job.job import Job
-from contact_core.rig.poses import posed_points
 from contact_core.rig.rig import Pose
+from contact_core.scene.document_picture import world_mesh
 from contact_core.scene.picture import Picture, PictureMesh
 
 SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
@@ -44,10 +43,13 @@ def pictures_of(job: Job, rows: Rows) -> list[Picture]:
 
 
 def _picture(job: Job, poses: Mapping[str, Pose], caption: str) -> Picture:
-    meshes = {name: _standing(job, name, poses) for name in job.assets}
+    session, document = job.session, job.session.document
+    geometry = session.geometry.of(replace(document, poses=document.poses.updated(poses)))
+    unit = document.surface(next(iter(poses))).meters_per_unit
+    meshes = {name: world_mesh(geometry, name, unit) for name in job.assets}
     points, lines = [], []
-    for pair in job.session.geometry.pairs():
-        color = job.session.document.patch(pair.pair.manipulator).color
+    for pair in geometry.pairs():
+        color = document.patch(pair.pair.manipulator).color
         here = pair.manipulator_points.positions(meshes[pair.manipulator_surface])
         there = pair.object_points.positions(meshes[pair.object_surface])
         points += [(here, color), (there, color)]
@@ -63,13 +65,6 @@ def _picture(job: Job, poses: Mapping[str, Pose], caption: str) -> Picture:
         caption=caption,
         focus=_focus(job, meshes, poses, np.concatenate([line[:, 1] for line, _ in lines])),
     )
-
-
-def _standing(job: Job, name: str, poses: Mapping[str, Pose]) -> TriangleMesh:
-    """A surface in world space, in its pose where it has one."""
-    mesh, rig = job.session.geometry.mesh(name), job.session.rigs.get(name)
-    points = posed_points(rig, poses[name]) if rig is not None else mesh.points
-    return mesh.with_points(transform_points(job.session.document.surface(name).world_from_surface, points))
 
 
 def _focus(

@@ -14,7 +14,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job.recipe import PatchSpec, PointSpec, RootSpec
+from contact_core.recipe.recipe import PatchSpec, PointSpec, RootSpec
 from contact_core.rig.bones import skin_point
 
 _UPRIGHT = 0.05  # sine of the angle to the normal below which a direction tells no heading

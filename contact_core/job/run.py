@@ -18,20 +18,20 @@ from contact_core.atomic_set import check_writable
 from contact_core.document.asset import Asset
 from contact_core.errors import Cancelled, InvalidInput, NotManifold
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job.inputs import object_mesh, read_source, solids_of
 from contact_core.job.job import Job, JobResult
 from contact_core.job.measuring import judged, measured
 from contact_core.job.outputs import files_of, write_outputs
 from contact_core.job.points import axis_points, painted_points, target_root
-from contact_core.job.recipe import PatchSpec, Recipe
-from contact_core.job.recipe_reader import load_recipe
-from contact_core.job.standing import backed_off, world_from_manipulator, world_from_object
+from contact_core.job.standing import object_mesh, solids_of, world_from_manipulator, world_from_object
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import AXIS_GENERATORS, PLACERS, POSE_TERMS
 from contact_core.plugins.slots import PlacementRequest, PlacementResult
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.proposal import AGAIN, Proposal, SolveSettings
-from contact_core.rig.poses import curled
+from contact_core.recipe.reader import load_recipe
+from contact_core.recipe.recipe import PatchSpec, Recipe
+from contact_core.recipe.sources import read_source
+from contact_core.rig.poses import backed_off, curled
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective
 from contact_core.session import Session
@@ -189,18 +189,12 @@ def place_from(
         rig=job.session.rigs[hand],
         pose=pose,
         object_mesh=geometry.mesh(thing),
-        object_from_rig=object_from(job, thing, hand),
+        object_from_rig=geometry.surface_from_surface(thing, hand),
         patch_points={name: geometry.points(name) for name in names},
         patch_axes={name: geometry.axis_points(name) for name in names},
         solids=job.solids[thing],
     )
     return plugins.make(PLACERS, plugins.name_for(PLACERS, "recipe", placer), **options).place(request)
-
-
-def object_from(job: Job, thing: str, hand: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """(4, 4) rigid, from the rig space of a manipulator into the space of an object."""
-    surfaces = job.session.document.surfaces
-    return np.asarray(np.linalg.inv(surfaces[thing].world_from_surface) @ surfaces[hand].world_from_surface)
 
 
 def target(patch: str, thing: str = "object") -> str:
@@ -217,12 +211,12 @@ def _transfer(job: Job, name: str, thing: str, point: SurfacePoints, **heading: 
 
 def _start(job: Job) -> None:
     """Where the solve starts: the open hand away from its objects, or the placer's coarse pose."""
-    recipe, session = job.recipe, job.session
+    recipe, session, geometry = job.recipe, job.session, job.session.geometry
     usual = tuple(-x for x in recipe.placer_options.get("approach", (0.0, 0.0, -1.0)))
     direction = np.array(recipe.away_direction or usual, float)
     for spec in recipe.manipulators:
         hand = spec.name
-        objects = [(object_from(job, t, hand), session.geometry.mesh(t)) for h, t in job.touching if h == hand]
+        objects = [(geometry.surface_from_surface(t, hand), geometry.mesh(t)) for h, t in job.touching if h == hand]
         job.start_distance[hand] = 0.0
         if hand not in job.start:
             clear = recipe.away * job.length(hand)

@@ -1,19 +1,40 @@
-"""Where things stand before a solve: objects as the recipe lays them, the open hand away from them."""
+"""How what a recipe names stands in the world: objects in the units of the manipulators, each where it is laid."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from contact_core.arrays import FloatArray
+from contact_core.document.asset import Asset
+from contact_core.errors import InvalidInput
+from contact_core.geometry.hull import convex_hull
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.raycast import Locator
-from contact_core.geometry.transform import transform_points
-from contact_core.job.recipe import ManipulatorSpec, ObjectSpec
-from contact_core.rig.rig import Pose, Rig
+from contact_core.recipe.recipe import ManipulatorSpec, ObjectSpec
 from contact_core.strict_table import Vector
+
+_MOST_LENGTHS = 1e4  # that an object is larger or smaller than the manipulator: a hand holds a pin, and a hull
+
+
+def object_mesh(asset: Asset, spec: ObjectSpec, meters_per_unit: float, length: float) -> TriangleMesh:
+    """The object's surface in the manipulator's units (`meters_per_unit`), the recipe's scale applied.
+
+    length: of the manipulator. Raises InvalidInput for an object of a size that only a wrong unit explains.
+    """
+    factor = spec.scale * (1.0 if asset.meters_per_unit is None else asset.meters_per_unit / meters_per_unit)
+    share = factor * asset.mesh.bounding_box_diagonal / length
+    if not 1.0 / _MOST_LENGTHS <= share <= _MOST_LENGTHS:
+        raise InvalidInput(
+            f"the object {asset.name} is {share:.2g} lengths of the manipulator across; mend object.scale, or the"
+            " units of one of the two files (`contact inspect` tells them)."
+        )
+    return asset.mesh if factor == 1.0 else TriangleMesh(asset.mesh.points * factor, asset.mesh.faces)
+
+
+def solids_of(mesh: TriangleMesh, spec: ObjectSpec) -> tuple[TriangleMesh, ...]:
+    """The closed surfaces whose inside counts as inside the object."""
+    made = {"surface": lambda: mesh, "hull": lambda: convex_hull(mesh, spec.fill_low, spec.fill_high)}
+    return tuple(made[kind]() for kind in spec.solids)
 
 
 def world_from_manipulator(spec: ManipulatorSpec) -> FloatArray:
@@ -30,32 +51,6 @@ def world_from_object(spec: ObjectSpec, mesh: TriangleMesh) -> FloatArray:
     placed = _turned(spec.rotation)
     placed[:3, 3] = np.asarray(spec.center) - placed[:3, :3] @ middle
     return placed
-
-
-def backed_off(
-    rig: Rig, objects: Sequence[tuple[FloatArray, TriangleMesh]], direction: FloatArray, clear: float
-) -> tuple[Pose, float]:
-    """The open hand (rest pose), backed off along `direction` (rig space) until `clear` of all objects; and how
-    clear it is (surface units).
-
-    objects: each with object_from_rig (4, 4). Closest distances are 1-Lipschitz, so each step of what is missing is
-    safe.
-    """
-    back = direction / np.linalg.norm(direction)
-    locators = [(into, Locator.of(mesh)) for into, mesh in objects]
-    travelled, nearest = 0.0, 0.0
-    for _ in range(200):
-        points = rig.surface.points + travelled * back
-        nearest = min(
-            (float(locator.closest(transform_points(into, points)).distance.min()) for into, locator in locators),
-            default=clear,
-        )
-        if nearest >= clear * (1.0 - 1e-6):
-            break
-        travelled += max(clear - nearest, 1e-3 * clear)
-    local = rig.rest_local.copy()
-    local[rig.parents < 0, :3, 3] += travelled * back
-    return Pose(rig.joints, local), nearest
 
 
 def _turned(degrees: Vector) -> FloatArray:

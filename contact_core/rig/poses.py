@@ -11,6 +11,9 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.raycast import Locator
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.chart import Chart, pose_on
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
 from contact_core.rig.rotations import exponential, nearest_rotations
@@ -55,6 +58,32 @@ def moved_roots(rig: Rig, pose: Pose, move: FloatArray) -> Pose:
     roots = rig.parents < 0
     local[roots] = move @ local[roots]
     return Pose(rig.joints, local)
+
+
+def backed_off(
+    rig: Rig, objects: Sequence[tuple[FloatArray, TriangleMesh]], direction: FloatArray, clear: float
+) -> tuple[Pose, float]:
+    """The open hand (rest pose), backed off along `direction` (rig space) until `clear` of all objects; and how
+    clear it is (surface units).
+
+    objects: each with object_from_rig (4, 4). Closest distances are 1-Lipschitz, so each step of what is missing is
+    safe.
+    """
+    back = direction / np.linalg.norm(direction)
+    locators = [(into, Locator.of(mesh)) for into, mesh in objects]
+    travelled, nearest = 0.0, 0.0
+    for _ in range(200):
+        points = rig.surface.points + travelled * back
+        nearest = min(
+            (float(locator.closest(transform_points(into, points)).distance.min()) for into, locator in locators),
+            default=clear,
+        )
+        if nearest >= clear * (1.0 - 1e-6):
+            break
+        travelled += max(clear - nearest, 1e-3 * clear)
+    local = rig.rest_local.copy()
+    local[rig.parents < 0, :3, 3] += travelled * back
+    return Pose(rig.joints, local), nearest
 
 
 def set_angles(rig: Rig, pose: Pose, angles: Mapping[str, float]) -> Pose:

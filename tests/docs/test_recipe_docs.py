@@ -8,11 +8,11 @@ import re
 from pathlib import Path
 
 from contact_builtins.placers import from_pose
-from contact_core.job import recipe_reader
+from contact_core.recipe import reader
 
 
 def test_every_key_is_documented_and_no_other(repository: Path) -> None:
-    source = inspect.getsource(recipe_reader)
+    source = inspect.getsource(reader)
     calls = r"\.(?:raw|text|choice|flag|number|count|vector|vectors|texts|counts|table|tables)\(\s*\"(\w+)\""
     known = set(re.findall(calls, source))
     known |= {

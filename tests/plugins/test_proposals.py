@@ -13,10 +13,10 @@ from contact_core.document.schema import document_to_json
 from contact_core.errors import Cancelled, CommandRejected, InvalidInput
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
 from contact_core.proposals.proposal import Proposal, SolveSettings
+from contact_core.recipe.reader import load_recipe
 from contact_core.rig.rig import Rig
 from contact_core.scene.memory_host import MemoryHost
 from contact_core.session import DocumentChanged, Session

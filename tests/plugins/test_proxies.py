@@ -24,12 +24,12 @@ from contact_core.geometry.report import report
 from contact_core.geometry.surface_map import SurfaceMap
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
-from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import prepare
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.proxies import made_proxy
 from contact_core.plugins.registry import PROXY_MAKERS
 from contact_core.progress import NO_PROGRESS
+from contact_core.recipe.reader import load_recipe
 from contact_core.rig.carried import carried
 from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.session import Session

@@ -14,14 +14,14 @@ import contact_builtins
 from contact_builtins.demos import demo_recipe
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.job.recipe import Recipe
-from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import perform
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.depth_bound import DepthBound, measured
 from contact_core.proposals.draft import Draft
 from contact_core.proposals.proposal import SolveSettings, slide
+from contact_core.recipe.reader import load_recipe
+from contact_core.recipe.recipe import Recipe
 from contact_core.rig.rig import skin
 from contact_core.scene.problem import Objective
 from contact_core.solve.body import Body, PairedPoints

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from contact_core.errors import InvalidInput
 from contact_core.job.job import JobResult
-from contact_core.job.recipe import Recipe
-from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import run
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.recipe.reader import parse_recipe
+from contact_core.recipe.recipe import Recipe
 
 DEFAULT = "mug"
 

@@ -12,9 +12,9 @@ import contact_core as contact
 from contact_builtins.demos import demo_recipe
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
-from contact_core.job.recipe import Recipe
-from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import perform
+from contact_core.recipe.reader import parse_recipe
+from contact_core.recipe.recipe import Recipe
 from contact_core.scene.picture import Picture
 from contact_gallery.looks import LOOKS, SKIN, deepest, view
 from contact_gallery.sheet import Sheet

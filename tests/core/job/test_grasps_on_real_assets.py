@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 
 from contact_core.job.job import Job
-from contact_core.job.recipe_reader import load_recipe
 from contact_core.job.run import perform
 from contact_core.plugins.manager import PluginManager
+from contact_core.recipe.reader import load_recipe
 
 pytestmark = [pytest.mark.assets, pytest.mark.slow]
 

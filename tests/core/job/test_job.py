@@ -16,15 +16,15 @@ from contact_builtins.demos import demo_names, demo_recipe
 from contact_core.document.schema import parse_document
 from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInput
 from contact_core.geometry.hull import convex_hull
-from contact_core.job.inputs import inputs_of
 from contact_core.job.job import Job
 from contact_core.job.outputs import write_outputs
 from contact_core.job.points import painted_points
-from contact_core.job.recipe import AssetSource, PatchSpec, PointSpec, Recipe, RootSpec
-from contact_core.job.recipe_reader import parse_recipe
 from contact_core.job.run import perform, run, target
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import CallbackProgress
+from contact_core.recipe.reader import parse_recipe
+from contact_core.recipe.recipe import AssetSource, PatchSpec, PointSpec, Recipe, RootSpec
+from contact_core.recipe.sources import inputs_of
 from contact_core.rig.pose_files import load_pose
 from contact_core.scene.picture import Picture
 from contact_core.testing.meshes import icosphere, torus

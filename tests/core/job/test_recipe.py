@@ -9,7 +9,7 @@ import pytest
 
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.grasping.verdict import ACCEPT
-from contact_core.job.recipe_reader import load_recipe, parse_recipe
+from contact_core.recipe.reader import load_recipe, parse_recipe
 
 GOOD = """
 schema = 1

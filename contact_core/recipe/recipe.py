@@ -1,4 +1,4 @@
-"""Recipes: what `contact pose` is asked to do. `recipe_reader` reads them from strict TOML.
+"""Recipes: what `contact pose` is asked to do. `reader` reads them from strict TOML.
 
 Lengths are in the units of the surface they lie on, directions and positions in that surface's own space,
 angles in degrees. The whole schema, with every default, is in docs/recipes.md, which a test compares.

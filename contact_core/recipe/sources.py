@@ -10,14 +10,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused, InvalidInput
-from contact_core.geometry.hull import convex_hull
-from contact_core.geometry.mesh import TriangleMesh
-from contact_core.job.recipe import AssetSource, ObjectSpec, Recipe
+from contact_core.errors import FileRefused
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import SAMPLE, read_asset
-
-_MOST_LENGTHS = 1e4  # that an object is larger or smaller than the manipulator: a hand holds a pin, and a hull
+from contact_core.recipe.recipe import AssetSource, Recipe
 
 
 def read_source(source: AssetSource, plugins: PluginManager, folder: Path | None = None) -> Asset:
@@ -69,27 +65,6 @@ def _candidates(name: str, folder: Path | None) -> Iterator[Path]:
     for place in places:
         if place.is_dir() and plain == name:
             yield from sorted(path for path in place.rglob(plain) if path.is_file())
-
-
-def object_mesh(asset: Asset, spec: ObjectSpec, meters_per_unit: float, length: float) -> TriangleMesh:
-    """The object's surface in the manipulator's units (`meters_per_unit`), the recipe's scale applied.
-
-    length: of the manipulator. Raises InvalidInput for an object of a size that only a wrong unit explains.
-    """
-    factor = spec.scale * (1.0 if asset.meters_per_unit is None else asset.meters_per_unit / meters_per_unit)
-    share = factor * asset.mesh.bounding_box_diagonal / length
-    if not 1.0 / _MOST_LENGTHS <= share <= _MOST_LENGTHS:
-        raise InvalidInput(
-            f"the object {asset.name} is {share:.2g} lengths of the manipulator across; mend object.scale, or the"
-            " units of one of the two files (`contact inspect` tells them)."
-        )
-    return asset.mesh if factor == 1.0 else TriangleMesh(asset.mesh.points * factor, asset.mesh.faces)
-
-
-def solids_of(mesh: TriangleMesh, spec: ObjectSpec) -> tuple[TriangleMesh, ...]:
-    """The closed surfaces whose inside counts as inside the object."""
-    made = {"surface": lambda: mesh, "hull": lambda: convex_hull(mesh, spec.fill_low, spec.fill_high)}
-    return tuple(made[kind]() for kind in spec.solids)
 
 
 def inputs_of(recipe: Recipe) -> dict[str, dict[str, str]]:

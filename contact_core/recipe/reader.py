@@ -7,7 +7,7 @@ from typing import Any
 
 from contact_core.errors import ContactError, FileRefused, InvalidInput
 from contact_core.grasping.verdict import ACCEPT
-from contact_core.job.recipe import (
+from contact_core.recipe.recipe import (
     AssetSource,
     DiskSpec,
     ManipulatorSpec,

@@ -1,0 +1,1 @@
+"""Recipes: what a job is asked to do, as a value, and the strict reader of their files."""
