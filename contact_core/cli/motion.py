@@ -33,15 +33,33 @@ class Motion:
         )
         parser.add_argument("--skate", type=finite, metavar="WEIGHT", help="cost of contacts that slip (0.05)")
         parser.add_argument("--tolerance", type=finite, default=1.0, metavar="MM", help="of the keys (1 mm)")
+        parser.add_argument(
+            "--movie", type=Path, metavar="FILE", help="the movie: .gif, .webp or .webm (DIR/film.gif)"
+        )
+        parser.add_argument(
+            "--turn",
+            type=finite,
+            default=0.0,
+            metavar="DEGREES",
+            help="the camera goes round; 360: a turntable (0)",
+        )
+        parser.add_argument("--width", type=int, default=480, metavar="PIXELS", help="of the movie (480)")
         parser.add_argument("--no-pictures", action="store_true", help="no film strip and no movie")
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.atomic_file import write_atomic
+        from contact_core.errors import InvalidInput
         from contact_core.job.clip import write_clip
-        from contact_core.job.film import figures_of, write_movie, write_strip
+        from contact_core.job.film import figures_of, words_of, write_strip
+        from contact_core.job.movie import check_movie, write_movie
         from contact_core.opening import open as open_scene
 
         out, progress = arguments.out, arguments.output
+        movie = arguments.movie or out / "film.gif"
+        if arguments.movie is not None:
+            check_movie(movie)
+        if not 16 <= arguments.width <= 4096:
+            raise InvalidInput(f"a movie is 16 to 4096 pixels wide, but got {arguments.width}.")
         with open_scene(arguments.scene, plugins=arguments.plugins) as session:
             frames = _frames(session, arguments.frames)
             if arguments.detect:
@@ -56,8 +74,11 @@ class Motion:
             files["clip"] = write_clip(session, frames, out / "film.glb")
             if not arguments.no_pictures:
                 files["strip"] = write_strip(session, frames, out / "strip.png")
-                files["movie"] = write_movie(session, frames, out / "film.gif", progress=progress)
-        lines = [columns([(" ", name, value) for name, value in _table(figures)])]
+                size = (arguments.width, round(0.75 * arguments.width))
+                files["movie"] = write_movie(
+                    session, frames, movie, size=size, turn=arguments.turn, progress=progress
+                )
+        lines = [columns([(" ", name, value) for name, value in words_of(figures)])]
         lines += [f"{role}: {path}" for role, path in files.items()]
         answer = {"report": figures, "files": {role: str(path) for role, path in files.items()}}
         progress.answer(answer, "\n".join(lines))
@@ -99,22 +120,3 @@ def _solved(
 
 def _keyed_name(scene: Path) -> str:
     return f"{scene.name.partition('.')[0]}.keyed{''.join(scene.suffixes[-1:])}"
-
-
-def _table(figures: dict[str, Any]) -> list[tuple[str, str]]:
-    rows = [("frames", f"{figures['frames'][0]:g} to {figures['frames'][1]:g} at {figures['rate']:g} per second")]
-    for name, pair in figures["pairs"].items():
-        rows.append(
-            (
-                name,
-                f"{1e3 * pair['error_mean']:.2f} mm apart in the mean, {1e3 * pair['error_worst']:.2f} at frame"
-                f" {pair['worst_frame']:g}; slips at most {1e3 * pair['skate_max_per_second']:.2f} mm/s",
-            )
-        )
-    deep = [1e3 * figures[f"penetration_{when}"] for when in ("held", "transit")]
-    rows.append(("penetration", f"{deep[0]:.2f} mm while held, {deep[1]:.2f} mm between"))
-    step = f"{1e3 * figures['largest_step']:.1f} mm to frame {figures['largest_step_frame']:g}"
-    rows.append(("largest step", step))
-    for name, count in figures["keys"].items():
-        rows.append((f"keys of {name}", f"{count}, the skin within {1e3 * figures['key_error'][name]:.2f} mm"))
-    return rows

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contact_core.atomic_file import write_atomic
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.errors import InvalidInput
 from contact_core.geometry.transform import transform_points
 from contact_core.plugins.registry import RENDERERS
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.scene.camera import DEFAULT_FROM
 from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.scene.problem import world_from_surface
 
@@ -25,8 +24,7 @@ if TYPE_CHECKING:
 
 SKIN, THING = (0.84, 0.64, 0.53), (0.66, 0.69, 0.74)
 STRIP = 6  # pictures of a strip
-PANEL, MOVIE = (300, 300), (480, 360)  # pixels
-MOST_PICTURES = 2_000  # of a movie
+PANEL = (300, 300)  # pixels
 
 
 def picture_at(session: Session, frame: float) -> Picture:
@@ -49,7 +47,16 @@ def picture_at(session: Session, frame: float) -> Picture:
             points.append((pair.manipulator_points.positions(posed[pair.manipulator_surface]), color))
             points.append((pair.object_points.positions(posed[pair.object_surface]), color))
     meshes = tuple(PictureMesh(mesh, SKIN if name in session.rigs else THING) for name, mesh in posed.items())
-    return Picture(meshes, tuple(points), caption=f"frame {frame:g}")
+    eye, up = seen_from(still.surfaces[loaded[0]].up_axis)
+    return Picture(meshes, tuple(points), camera_from=eye, up=up, caption=f"frame {frame:g}")
+
+
+def seen_from(up_axis: str) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """From where a scene with that axis up is seen by default, and up."""
+    x, y, z = DEFAULT_FROM
+    eyes = {"X": (y, -x, z), "Y": (x, y, z), "Z": (x, -z, y)}
+    ups = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+    return eyes[up_axis], ups[up_axis]
 
 
 def pictures_of(session: Session, frames: Sequence[float], progress: Progress = NO_PROGRESS) -> list[Picture]:
@@ -75,43 +82,7 @@ def write_strip(
     chosen = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
     pictures = pictures_of(session, chosen)
     size = (panel[0] * len(pictures), panel[1])
-    _renderer(session).render(pictures, path, size=size)
-    return path
-
-
-def write_movie(
-    session: Session,
-    frames: Sequence[float],
-    path: Path,
-    *,
-    size: tuple[int, int] = MOVIE,
-    progress: Progress = NO_PROGRESS,
-) -> Path:
-    """A GIF that plays frames at the rate of the film, over and over.
-
-    Raises InvalidInput where Pillow, which makes GIFs, is not there, Cancelled, FileRefused.
-    """
-    try:
-        from PIL import Image
-    except ImportError:
-        raise InvalidInput("a movie needs Pillow: pip install 'contact-core[app]'.") from None
-    if not 0 < len(frames) <= MOST_PICTURES:
-        raise InvalidInput(f"a movie has 1 to {MOST_PICTURES} pictures, but got {len(frames)} frames.")
-    rate, renderer = session.timeline.settings.frames_per_second, _renderer(session)
-    pictures = pictures_of(session, frames, progress.part(0.0, 0.3))
-    images = []
-    with tempfile.TemporaryDirectory() as folder:
-        for row, picture in enumerate(pictures):
-            progress.part(0.3, 1.0).tell(row / len(pictures), picture.caption)
-            still = Path(folder) / "frame.png"
-            renderer.render([picture], still, size=size)
-            with Image.open(still) as drawn:
-                images.append(drawn.convert("P", palette=Image.Palette.ADAPTIVE))
-        made = Path(folder) / "film.gif"
-        images[0].save(
-            made, save_all=True, append_images=images[1:], duration=max(round(1000.0 / rate), 20), loop=0
-        )
-        write_atomic(path, made.read_bytes())
+    renderer_of(session).render(pictures, path, size=size)
     return path
 
 
@@ -157,6 +128,44 @@ def figures_of(proposal: MotionProposal, *, depth: bool = True) -> dict[str, Any
     }
 
 
+def words_of(figures: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The report of `figures_of` in words: what it is about, and a sentence on it."""
+    first, last = figures["frames"]
+    rows = [("frames", f"{first:g} to {last:g} at {figures['rate']:g} per second, {figures['status'].lower()}")]
+    for name, pair in figures["pairs"].items():
+        rows += [(name, _error_words(pair)), ("", _skate_words(pair))]
+    rows.append(("joints", f"accelerate by at most {figures['joint_acceleration_max']:.0f} degrees/s²"))
+    pads = f"accelerate by at most {1e3 * figures['pad_acceleration_max']:.0f} mm/s²"
+    rows.append(("pads", f"{pads}, jerk {1e3 * figures['jerk_rms']:.0f} mm/s³ rms"))
+    if figures["penetration_held"] is not None:
+        held, between = (1e3 * figures[f"penetration_{when}"] for when in ("held", "transit"))
+        rows.append(("penetration", f"{held:.2f} mm while held, {between:.2f} mm in transit"))
+    step = f"{1e3 * figures['largest_step']:.1f} mm to frame {figures['largest_step_frame']:g}"
+    pop = figures["pop"]
+    beside = "out of rest: a pop" if pop is None else f"{pop:.2f} times the larger of those beside it"
+    rows.append(("largest step", f"{step}, {beside}{'' if pop is None or pop < 2.0 else ': a pop'}"))
+    for name, excess in (("speed", figures["speed_excess"]), ("acceleration", figures["acceleration_excess"])):
+        if excess > 0.0:
+            rows.append(("bounds", f"on {name} are exceeded by up to {100.0 * excess:.1f} %"))
+    for name, count in figures["keys"].items():
+        off = 1e3 * figures["key_error"][name]
+        rows.append((f"keys of {name}", f"{count} for all frames, the skin within {off:.2f} mm"))
+    return rows
+
+
+def _error_words(pair: Mapping[str, Any]) -> str:
+    mean, p95, worst = (1e3 * pair[f"error_{what}"] for what in ("mean", "p95", "worst"))
+    return (
+        f"on for {pair['frames']} frames; {mean:.2f} mm apart in the mean, {p95:.2f} for 95 % of its points, worst"
+        f" {worst:.2f} at frame {pair['worst_frame']:g}"
+    )
+
+
+def _skate_words(pair: Mapping[str, Any]) -> str:
+    most, rms = (1e3 * pair[f"skate_{what}_per_second"] for what in ("max", "rms"))
+    return f"slips by at most {most:.2f} mm/s, {rms:.2f} rms"
+
+
 def _metres(proposal: MotionProposal) -> float:
     """Of a unit of the problem's world: that of the first surface of the first pair."""
     assert proposal.motion is not None
@@ -164,7 +173,7 @@ def _metres(proposal: MotionProposal) -> float:
     return proposal.ghost.surfaces[first].meters_per_unit
 
 
-def _renderer(session: Session) -> Any:
+def renderer_of(session: Session) -> Any:
     """The best renderer that draws here."""
     name = session.plugins.name_for(RENDERERS, "thumbnail")
     return session.plugins.get(RENDERERS, name)

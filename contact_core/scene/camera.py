@@ -16,7 +16,7 @@ LEGEND_AT = 0.55  # of the frame's width, where the legend begins; the table beg
 LEGEND_ROWS = 11  # more patches than that are counted in the last row
 WIDEST_NAME = 22  # letters of a row's name; a longer one pushes its value aside
 MARGIN = 0.07  # of the frame's height at its top and its bottom; the caption stands in it
-_DEFAULT_FROM = (0.55, 0.4, 1.0)
+DEFAULT_FROM = (0.55, 0.4, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ def camera_of(picture: Picture, aspect: float) -> Camera:
         points = np.asarray(picture.focus, float)  # (n, 3)
     else:
         points = np.concatenate([item.mesh.points[np.unique(item.mesh.faces)] for item in picture.meshes])
-    back = np.asarray(picture.camera_from or _DEFAULT_FROM, float)
+    back = np.asarray(picture.camera_from or DEFAULT_FROM, float)
     back = back / np.linalg.norm(back)
     right = np.cross(np.asarray(picture.up, float), back)
     if np.linalg.norm(right) < 1e-6:  # looking along up: any horizontal will do

@@ -11,7 +11,8 @@ import pytest
 
 import contact_core as contact
 from contact_core.cli import main
-from contact_core.job.film import picture_at, pictures_of, write_movie, write_strip
+from contact_core.job.film import picture_at, pictures_of, write_strip
+from contact_core.job.movie import going_round, write_movie
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
 from test_film import ARM, BALL, assets, film  # type: ignore[import-not-found]
@@ -45,18 +46,61 @@ def test_a_film_is_solved_keyed_reported_and_drawn(scene: Path, capsys: pytest.C
         assert np.abs(shown.local - keyed.local).max() < 5e-3  # linear and cubic keys of one motion
 
 
-def test_a_strip_and_a_movie(scene: Path) -> None:
-    image = pytest.importorskip("PIL.Image", reason="Pillow, which makes movies, is not installed")
+def test_the_report_is_told_in_words_too(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["motion", str(scene), "--out", str(scene.parent / "told"), "--no-pictures"]) == 0
+    said, report = capsys.readouterr().out, json.loads((scene.parent / "told" / "motion.json").read_text())
+    pair = report["pairs"]["touch"]
+    for value in ("error_mean", "error_p95", "error_worst", "skate_max_per_second", "skate_rms_per_second"):
+        assert f"{1e3 * pair[value]:.2f}" in said
+    assert f"at frame {pair['worst_frame']:g}" in said and f"jerk {1e3 * report['jerk_rms']:.0f} mm/s³ rms" in said
+    assert f"{1e3 * report['penetration_transit']:.2f} mm in transit" in said
+    assert f"{1e3 * report['largest_step']:.1f} mm to frame {report['largest_step_frame']:g}" in said
+    assert f"{report['keys'][ARM]} for all frames" in said and ": a pop" not in said
+
+
+def test_a_strip(scene: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="Pillow looks at it")
     with contact.open(scene) as session:
-        frames = [0.0, 8.0, 20.0]
-        write_strip(session, frames, scene.parent / "strip.png", count=2, panel=(48, 40))
-        write_movie(session, frames, scene.parent / "film.gif", size=(48, 40))
-        with pytest.raises(contact.InvalidInput, match="a movie has"):
-            write_movie(session, [], scene.parent / "none.gif")
+        write_strip(session, [0.0, 8.0, 20.0], scene.parent / "strip.png", count=2, panel=(48, 40))
     with image.open(scene.parent / "strip.png") as strip:
         assert strip.size == (96, 40)
-    with image.open(scene.parent / "film.gif") as movie:
-        assert movie.n_frames == 3 and movie.info["duration"] in (40, 42)  # hundredths of a second
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".webp", ".webm"])
+def test_a_movie_lasts_as_long_as_the_film(scene: Path, suffix: str) -> None:
+    image = pytest.importorskip("PIL.Image", reason="Pillow, which makes movies, is not installed")
+    path, frames = scene.parent / f"film{suffix}", list(map(float, range(25)))
+    if suffix == ".webm":
+        av = pytest.importorskip("av", reason="PyAV, which makes WebM, is not installed")
+    with contact.open(scene) as session:
+        write_movie(session, frames, path, size=(49, 41), turn=90.0)
+        with pytest.raises(contact.InvalidInput, match="a movie has"):
+            write_movie(session, [], scene.parent / "none.gif")
+        with pytest.raises(contact.InvalidInput, match="ends in"):
+            write_movie(session, frames, scene.parent / "none.avi")
+    if suffix == ".webm":
+        with av.open(str(path)) as movie:
+            shown = list(movie.decode(video=0))
+        assert len(shown) == 25 and (shown[0].width, shown[0].height) == (48, 40)
+        assert float(shown[-1].time) == pytest.approx(1.0, abs=0.01)
+        return
+    with image.open(path) as movie:
+        lengths = []
+        for k in range(movie.n_frames):
+            movie.seek(k)
+            movie.load()
+            lengths.append(movie.info["duration"])
+        assert movie.n_frames == 25 and movie.size == (49, 41) and movie.info["loop"] == 0
+        assert sum(lengths) == pytest.approx(1000 * 25 / 24, abs=15 if suffix == ".gif" else 30)
+
+
+def test_the_camera_goes_round_what_stays(scene: Path) -> None:
+    with contact.open(scene) as session:
+        still = going_round(pictures_of(session, [12.0] * 4), 360.0)
+    eyes = np.array([picture.camera_from for picture in still])
+    assert np.allclose(eyes[:, 1], eyes[0, 1]) and np.allclose(eyes[0] + eyes[2], [0.0, 2.0 * eyes[0, 1], 0.0])
+    assert np.allclose(np.linalg.norm(eyes, axis=1), np.linalg.norm(eyes[0]))
+    assert all(np.array_equal(picture.focus, still[0].focus) for picture in still)
 
 
 def test_pictures_show_what_moves_through_one_camera(scene: Path) -> None:
@@ -76,6 +120,8 @@ def test_pictures_show_what_moves_through_one_camera(scene: Path) -> None:
         (["--frames", "5-1"], "frames are like"),
         (["--follow", "-1"], "follow"),
         (["--tolerance", "0"], "tolerance"),
+        (["--movie", "film.avi"], "ends in"),
+        (["--width", "3"], "pixels"),
     ],
 )
 def test_bad_arguments_are_refused_in_a_sentence(
