@@ -95,7 +95,8 @@ class Walk:
         own = given.get(name, {})
         if name not in ("paint", "solve", "unpair"):
             own["patch"] = self.patch()
-        self.bpy.context.scene.cursor.location = (*(random.uniform(-1.5, 1.5, 2) + [0.0, 3.0]), 0.0)
+        x, y = random.uniform(-1.5, 1.5, 2)
+        self.bpy.context.scene.cursor.location = (x, y + 3.0, 0.0)
         before = self.state()
         try:
             self.forward(name, lambda: getattr(ops, name)(**own))
