@@ -1,7 +1,8 @@
-"""Write the table of actions and keys into docs/interaction.md: python .ci/keys.py"""
+"""Write the table of actions and keys into docs/interaction.md, and for Blender: python .ci/keys.py"""
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 
 from contact_core.interaction.actions import actions_of, key_table
@@ -9,6 +10,7 @@ from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import TOOLS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "interaction.md"
+BLENDER = Path(__file__).resolve().parents[1] / "adapters" / "blender" / "tool_table.py"
 BEGIN, END = "<!-- keys -->\n", "<!-- end of keys -->\n"
 
 
@@ -24,3 +26,4 @@ def page_with_table(text: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page_with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    runpy.run_path(str(BLENDER), run_name="__main__")

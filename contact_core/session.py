@@ -426,8 +426,11 @@ class Session(GraspingSession):
                 self._commit(command)
 
     @contextlib.contextmanager
-    def stroke(self) -> Iterator[Stroke]:
+    def stroke(self, seen: ContactDocument | None = None) -> Iterator[Stroke]:
         """A drag: the verbs of the stroke preview from its start, and the last one is committed at the end.
+
+        seen: the document as the scene has it now (`Binding.read`), from which the verbs then start; what they do
+        is committed to the document itself.
 
         What fails, in the drag or in committing it, leaves the document as it was at the start, and listeners see
         that again.
@@ -435,7 +438,7 @@ class Session(GraspingSession):
         with self._open_edits.alone():
             self._check_writable()
             start = self.document
-            stroke = Stroke(self, lambda shown: self._preview(start, shown))
+            stroke = Stroke(self, lambda shown: self._preview(start, shown), seen)
             self._open_edits.stroke = stroke
             try:
                 yield stroke

@@ -27,10 +27,12 @@ class Stroke:
     `Session.stroke` ends, the last command is committed as one step; when it raises, nothing has happened.
     """
 
-    def __init__(self, editor: Editor, preview: Callable[[ContactDocument], None]) -> None:
+    def __init__(
+        self, editor: Editor, preview: Callable[[ContactDocument], None], seen: ContactDocument | None = None
+    ) -> None:
         self.rigs = editor.rigs
         self.makers: Makers = KeptBrushes(editor.makers)
-        self._start = editor.document
+        self._start = editor.document if seen is None else seen
         self._derived = editor.derived
         self._preview = preview
         self._command: Command | None = None

@@ -31,6 +31,7 @@ class Desk:
     """See the module. Tools read everything; of the document they change only what `stroke` previews.
 
     view: of the event that is handled. ghost: a proposal's document, which is shown in place of the session's.
+    hidden: surfaces that the scene does not show: they are neither drawn nor picked.
     pins: terms that pull on hands while a gesture lasts: the pose that follows is the edit. Such a term names its
     `bodies`. held: joints that do not follow meanwhile. settled: whether the gesture itself has posed the
     hand, so that no solve follows it. remark: what is worth knowing of what a gesture did, for the line of status.
@@ -46,8 +47,11 @@ class Desk:
         self.held: tuple[str, ...] = ()
         self.settled = False
         self.remark = ""
+        self.hidden: frozenset[str] = frozenset()
+        self._base = self._base_of = session.document
         self._stack: contextlib.ExitStack | None = None
         self._stroke: Stroke | None = None
+        self._begun_at = session.document
         self._given: dict[tuple[str, str], dict[str, Any]] = {}
         self._made: dict[tuple[str, str], Any] = {}
         self.follow()
@@ -59,7 +63,23 @@ class Desk:
         """As it is shown now: what the stroke previews, what is proposed, else the session's."""
         if self._stroke is not None:
             return self._stroke.preview_document
-        return self.ghost or self.session.document
+        return self.ghost or self.base
+
+    @property
+    def base(self) -> ContactDocument:
+        """The session's document as the scene had it when it was last looked at; itself without a scene."""
+        if self._base_of is not self.session.document:
+            self._base_of, self._base = self.session.document, self._read(self.session.document)
+        return self._base
+
+    def look(self) -> frozenset[str]:
+        """Look at the scene again, where others move things and pose; returns the surfaces that moved."""
+        self._base = self._read(self.base)
+        return self.follow()
+
+    def _read(self, document: ContactDocument) -> ContactDocument:
+        binding = self.session.binding
+        return binding.read(document, leave=self.hidden) if binding.has_scene else document
 
     @property
     def shown(self) -> DocumentGeometry:
@@ -69,7 +89,9 @@ class Desk:
     def follow(self) -> frozenset[str]:
         """Bring the scene to the shown document; returns the surfaces that moved."""
         before = self.scene
-        self.scene = before.following(self.document, self.session.derived.known_meshes, self.session.rigs)
+        self.scene = before.following(
+            self.document, self.session.derived.known_meshes, self.session.rigs, self.hidden
+        )
         return self.scene.moved_since(before)
 
     def pick(self, pointer: Pointer, among: Iterable[str] | None = None) -> Hit | None:
@@ -135,7 +157,8 @@ class Desk:
         for; raises CommandRejected where the session cannot be edited."""
         if self._stroke is None:
             with contextlib.ExitStack() as stack:
-                self._stroke = stack.enter_context(self.session.stroke())
+                self._begun_at = self.session.document
+                self._stroke = stack.enter_context(self.session.stroke(self.base))
                 self._stack = stack.pop_all()
         return self._stroke
 
@@ -170,7 +193,7 @@ class Desk:
     def roll_back(self) -> None:
         """End the stroke with nothing: the document is the very one of the press."""
         if self._stroke is not None:
-            if self._stroke.document is self.session.document:  # else a host went elsewhere, and ended it
+            if self._begun_at is self.session.document:  # else a host went elsewhere, and ended it
                 self._stroke.cancel()
             self._stroke.abandon()
         self.commit()

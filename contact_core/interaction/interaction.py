@@ -176,6 +176,14 @@ class Interaction:
             raise
         return bool(self._moved or self._parts)
 
+    def look(self) -> None:
+        """Look at the scene of the session's host again, where others move things and pose hands; a gesture keeps
+        the scene of its press. For front ends whose scene is not theirs alone. Raises InvalidInput."""
+        moved = frozenset() if self.is_busy else self.desk.look()
+        if moved:
+            self._moved |= moved
+            self._touch("overlay")
+
     def prepare(self) -> None:
         """Build beside the window what the first drag would wait for: trees, normals and depths of all surfaces.
 

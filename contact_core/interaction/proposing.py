@@ -185,7 +185,7 @@ class Proposing:
         if self.proposal is None:
             return Overlay()
         session, desk = self._desk.session, self._desk
-        before = desk.scene.following(session.document, session.derived.known_meshes, session.rigs)
+        before = desk.scene.following(desk.base, session.derived.known_meshes, session.rigs, desk.hidden)
         moved = before.moved_since(desk.scene) & before.surfaces.keys()
         return Overlay(ghosts=tuple(
             Ghost(before.surfaces[name].points, before.surfaces[name].mesh.faces, _GHOST) for name in sorted(moved)

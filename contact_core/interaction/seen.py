@@ -6,7 +6,7 @@ that of its rest shape, refitted.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -89,16 +89,20 @@ class SeenScene:
     meters_per_unit: float = 1.0
 
     def following(
-        self, document: ContactDocument, meshes: Mapping[str, TriangleMesh], rigs: Mapping[str, Rig]
+        self,
+        document: ContactDocument,
+        meshes: Mapping[str, TriangleMesh],
+        rigs: Mapping[str, Rig],
+        hidden: Collection[str] = (),
     ) -> SeenScene:
         """The scene of another document; what did not move is the same object, its trees with it.
 
-        meshes: by content digest. rigs: by surface.
+        meshes: by content digest. rigs: by surface. hidden: surfaces that are not seen.
         """
         surfaces = {}
         for name, surface in document.surfaces.items():
             rest = meshes.get(surface.digest)
-            if rest is None:
+            if rest is None or name in hidden:
                 continue
             pose, known = document.poses.get(name), self.surfaces.get(name)
             world = world_from_surface(document, name, self.meters_per_unit)

@@ -7,7 +7,7 @@ The host is the truth about where things stand and how rigs are posed; the docum
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -192,15 +192,17 @@ class Binding:
 
     # --- what the scene says --------------------------------------------------------------------------------
 
-    def read(self, document: ContactDocument, frame: float | None = None) -> ContactDocument:
+    def read(
+        self, document: ContactDocument, frame: float | None = None, leave: Collection[str] = ()
+    ) -> ContactDocument:
         """The document with bound surfaces placed and bound rigs posed as the scene has them at a frame.
 
         The very same document where nothing differs. A surface whose object left the scene stays as it is, and is
-        in `missing`.
+        in `missing`; one in `leave` is not asked for.
         """
         there = {item.id for item in self.objects()}
         for name, found in self.surfaces.items():
-            if name not in document.surfaces:
+            if name not in document.surfaces or name in leave:
                 continue
             if found.object_id not in there:
                 self.missing[name] = f"the object {found.object_id!r} behind {name!r} has left the scene."

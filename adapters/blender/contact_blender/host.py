@@ -16,6 +16,7 @@ from contact_blender import rig as rigs
 from contact_blender.compat import bpy
 from contact_blender.ids import ObjectIds
 from contact_blender.lifetime import SceneEnd
+from contact_blender.previews import PosePreviews
 from contact_blender.undo import UndoBridge
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
@@ -94,6 +95,7 @@ class BlenderHost(
         self._known: dict[str, _KnownRig] = {}
         self._scene_uid = int(bpy.context.scene.session_uid)
         self._lifetime = SceneEnd()
+        self._previews = PosePreviews()
         storage.restore_ids(bpy.context.scene, self._ids)
 
     @classmethod
@@ -205,6 +207,27 @@ class BlenderHost(
             self._undo.wrote(lambda: put_back(self._ids.resolve(armature_id)))
             curves.write(armature, rig, pose_keys, placement.surface_from_local)
 
+    def preview_pose(self, object_id: str, pose: Pose) -> None:
+        """Show a pose on the bones while something is dragged or proposed: no step, no key. `end_previews` puts the
+        channels back as they were before the first."""
+        _, armature, placement = self._rigged(object_id)
+        self._previews.show(self._ids.id_of(armature), armature, unstretch_pose(pose, placement.surface_from_local))
+
+    def end_previews(self) -> None:
+        """Put back what `preview_pose` showed, bit for bit; what has left the scene is forgotten."""
+        self._previews.put_back(self._ids)
+
+    def forget_previews(self) -> None:
+        """After an undo of Blender's, which has put the channels where they belong."""
+        self._previews.forget()
+
+    def is_seen(self, object_id: str) -> bool:
+        """Whether the object is visible in the view layer of the window; not, where it has gone."""
+        try:
+            return bool(self._ids.resolve(object_id).visible_get())
+        except (InvalidInput, RuntimeError):  # gone, or not of this view layer
+            return False
+
     def pose_keys(self, object_id: str) -> tuple[float, ...]:
         return keys.frames(self._rigged(object_id)[1])
 
@@ -236,6 +259,10 @@ class BlenderHost(
 
     def step(self, label: str) -> AbstractContextManager[None]:
         return self._undo.step(label)
+
+    def step_of_operator(self) -> AbstractContextManager[None]:
+        """Inside, the operator that runs is the owner of the undo step, see `UndoBridge.left_to_operator`."""
+        return self._undo.left_to_operator()
 
     def undo(self) -> bool:
         return self._undo.undo()

@@ -27,6 +27,17 @@ class UndoBridge:
         self._listeners: list[Callable[[], None]] = []
         self._failure: Exception | None = None
         self._based_on: int | None = None
+        self._left_to_operator = False
+
+    @contextlib.contextmanager
+    def left_to_operator(self) -> Iterator[None]:
+        """Inside, steps push nothing: Blender pushes one itself when the operator that runs has ended, by its flag
+        UNDO. Then the panel of the last operator (F9) can take that step back and run it again."""
+        before, self._left_to_operator = self._left_to_operator, True
+        try:
+            yield
+        finally:
+            self._left_to_operator = before
 
     @contextlib.contextmanager
     def step(self, label: str) -> Iterator[None]:
@@ -47,7 +58,7 @@ class UndoBridge:
             self._depth -= 1
             if self._depth == 0:
                 wrote, self._undo_of_writes = bool(self._undo_of_writes), []
-                if wrote:
+                if wrote and not self._left_to_operator:
                     bpy.ops.ed.undo_push(message=label)
 
     def wrote(self, take_back: Callable[[], None]) -> None:

@@ -512,12 +512,12 @@ def test_a_broken_library_is_a_sentence(bpy: Any, shared: Any, monkeypatch: pyte
     assert drawn(bpy) == ["A library is missing or broken:", "see the add-on's preferences"]
 
 
-def test_the_operators_say_what_they_do_and_push_no_step_of_their_own(bpy: Any, shared: Any) -> None:
+def test_the_operators_say_what_they_do_and_can_be_run_again_by_f9(bpy: Any, shared: Any) -> None:
     from contact_blender.extension import operators
 
     assert len(operators.classes()) >= 20
     for kind in operators.classes():
-        assert kind.bl_options == {"REGISTER"} and len(kind.bl_description) > 15
+        assert kind.bl_options == {"REGISTER", "UNDO"} and len(kind.bl_description) > 15
         assert getattr(bpy.ops.contact, kind.bl_idname.partition(".")[2]).get_rna_type().name == kind.bl_label
 
 

@@ -1,4 +1,4 @@
-"""The extension that an artist installs: operators, a panel, preferences. Registering loads nothing heavy.
+"""The extension that an artist installs: tools, operators, a panel, preferences. Registering loads nothing heavy.
 
 The zip's own `__init__.py` (adapters/blender/build_extension.py) puts the vendored packages on the path and calls
 `register`; a script in a Blender that has contact-core installed may call it as well.
@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from contact_blender.extension import operators, panel, preferences, shared
+from contact_blender.extension import modal, operators, panel, preferences, shared, toolbar, warming
 
 _registered: list[Any] = []
 
@@ -19,16 +19,21 @@ def register(package: str = __name__) -> None:
     """Add everything to Blender. package: the name under which Blender enabled the add-on. Twice is once."""
     if _registered:
         return
-    for kind in (*panel.groups(), *operators.classes(), *panel.PANELS, preferences.of(package)):
+    warming.keep_kernels(package)
+    kinds = (*panel.groups(), *operators.classes(), *modal.CLASSES, *toolbar.classes(), *panel.PANELS)
+    for kind in (*kinds, preferences.of(package)):
         bpy.utils.register_class(kind)
         _registered.append(kind)
     bpy.types.WindowManager.contact = bpy.props.PointerProperty(type=panel.ContactSettings)
+    toolbar.register()
 
 
 def unregister() -> None:
     """Take everything out of Blender again, and close the sessions; their contacts stay in the scenes."""
     panel.stop_waiting()
     shared.close_all()
+    if _registered:
+        toolbar.unregister()
     if hasattr(bpy.types.WindowManager, "contact"):
         del bpy.types.WindowManager.contact
     while _registered:

@@ -1,11 +1,14 @@
 """Operators out of functions: properties, when it may run, and errors as reports.
 
-Classes are made, never inherited: registering a child of a registered operator breaks its parent. Their option is
-REGISTER alone, for the adapter pushes the undo step itself (ADR 0075) and UNDO would make a second one.
+Classes are made, never inherited: registering a child of a registered operator breaks its parent. Each is one
+step of undo with one owner. Where Blender runs an operator (a button, a key, F3, F9) its flag UNDO pushes the step,
+so that F9 can take it back and run it again with other values. Where a script calls it Blender pushes none, and the
+session's host does (ADR 0086).
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
@@ -33,7 +36,13 @@ def operator(name: str, label: str, needs: str = "", /, **properties: Any) -> Ca
             return not reason
 
         def execute(self: Any, context: Any) -> set[str]:
-            return _run(self, context, action)
+            again = self.options.is_repeat or self.options.is_repeat_last
+            return _run(self, context, action, by_blender=again)
+
+        def invoke(self: Any, context: Any, event: Any) -> set[str]:
+            if not event.type or event.type == "NONE":  # a script said INVOKE_DEFAULT without a window
+                return _run(self, context, action)
+            return _run(self, context, action, by_blender=True)
 
         _made.append(
             type(
@@ -46,9 +55,10 @@ def operator(name: str, label: str, needs: str = "", /, **properties: Any) -> Ca
                     "bl_idname": f"contact.{name}",
                     "bl_label": label,
                     "bl_description": " ".join((action.__doc__ or label).split()).rstrip("."),
-                    "bl_options": {"REGISTER"},
+                    "bl_options": {"REGISTER", "UNDO"},
                     "poll": classmethod(poll),
                     "execute": execute,
+                    "invoke": invoke,
                 },
             )
         )
@@ -81,13 +91,15 @@ def why_not(context: Any, needs: str) -> str:
     return "" if patches else "There is no patch yet: select vertices and paint one first"
 
 
-def _run(self: Any, context: Any, action: Action) -> set[str]:
+def _run(self: Any, context: Any, action: Action, by_blender: bool = False) -> set[str]:
     """Run an action; what it refuses is a report. A fault of the program becomes a sentence, too, and its traceback
-    goes to the console for those who report it."""
+    goes to the console for those who report it. by_blender: whether Blender pushes the step of undo."""
     from contact_core.errors import ContactError
 
     try:
-        said = action(shared.session(), context, self)
+        session = shared.session()
+        with session.host.step_of_operator() if by_blender else contextlib.nullcontext():
+            said = action(session, context, self)
     except ContactError as error:
         self.report({"ERROR"}, _sentence(error))
         return {"CANCELLED"}

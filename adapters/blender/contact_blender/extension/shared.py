@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 if TYPE_CHECKING:
+    from contact_blender.extension.artist import Artist
     from contact_core.document.document import ContactDocument
     from contact_core.proposals.proposal import Proposal
     from contact_core.session import Session
@@ -27,11 +28,12 @@ LIBRARIES = ("numpy", "scipy", "numba", "pluggy", "threadpoolctl", "rich")
 @dataclass
 class Held:
     """What is kept of a scene. residuals: 95 % of a pair's points are nearer than this (scene units), by pair, as
-    the solve of `solved` (a revision) left them."""
+    the solve of `solved` (a revision) left them. artist: the interaction with its views, once a tool was used."""
 
     session: Session
     residuals: dict[str, float] = field(default_factory=dict)
     solved: int = -1
+    artist: Artist | None = None
 
 
 _held: dict[int, Held] = {}
@@ -117,6 +119,27 @@ def session() -> Session:
     return begun
 
 
+def artist() -> Artist:
+    """The interaction with the session of the open scene, begun at the first use. Raises as `session`."""
+    session()
+    found = held()
+    assert found is not None  # the session that has just been begun
+    if found.artist is None:
+        from contact_blender.extension.artist import Artist
+
+        found.artist = Artist(found.session)
+    return found.artist
+
+
+def follow_selection() -> None:
+    """The patch that a tool has made the active one is that of the panel, too."""
+    found = held()
+    if found is not None and found.artist is not None and hasattr(bpy.context.window_manager, "contact"):
+        patch = found.artist.interaction.selection.patch
+        if patch is not None:
+            bpy.context.window_manager.contact.patch = patch
+
+
 def list_patches() -> None:
     """Bring the rows of the panel in line with the document: after every edit, undo and redo."""
     found, manager = held(), bpy.context.window_manager
@@ -167,8 +190,7 @@ def keep_residuals(proposal: Proposal) -> None:
 def close_all() -> None:
     """Close every session; contacts stay in their scenes."""
     for found in _held.values():
-        if found.session.host is not None:
-            found.session.close()
+        _close(found)
     _held.clear()
 
 
@@ -176,7 +198,15 @@ def _forget_ended() -> None:
     """Let go of sessions that have ended, and of those whose scene was removed."""
     there: set[Any] = {scene.session_uid for scene in bpy.data.scenes}
     for uid, found in tuple(_held.items()):
-        if uid not in there and found.session.host is not None:
-            found.session.close()
         if uid not in there or found.session.host is None:
+            _close(found)
             del _held[uid]
+
+
+def _close(found: Held) -> None:
+    """End the interaction, then the session where its scene has not ended it."""
+    if found.artist is not None:
+        found.artist.close()
+        found.artist = None
+    if found.session.host is not None:
+        found.session.close()

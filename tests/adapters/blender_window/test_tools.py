@@ -1,0 +1,133 @@
+"""The artist's tools in a real window: painting, transferring with the hand following, undo, solve, cancel."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+from blender_driver import Window, in_window
+
+
+def scene(window: Window) -> Iterator[Any]:
+    """A finger of three joints above a ball, seen from the front; tools are ready."""
+    bpy, extension = window.bpy, window.enable()
+    import numpy as np
+
+    import contact_core as contact
+    from contact_blender.extension import rehearsal
+
+    for name in ("Cube", "Light", "Camera"):
+        bpy.data.objects.remove(bpy.data.objects[name])
+    session = extension.shared.session()
+    if os.environ.get("CONTACT_TRY"):
+        for name in ("human_hand", "baseball"):
+            session.host.add(contact.read_asset(f"sample:{name}"))
+        bpy.data.objects["baseball"].location = (0.02, -0.12, 0.1)
+    else:
+        rig, there = rehearsal.finger(), np.eye(4)
+        there[:3, 3] = 5.0, 0.0, -2.6
+        session.host.add(contact.Asset("finger", rig.surface, rig=rig, meters_per_unit=1.0, up_axis="Z"))
+        session.host.add(contact.Asset("ball", rehearsal.ball(), meters_per_unit=1.0, up_axis="Z"), there)
+    bpy.context.view_layer.update()
+    with window.override():
+        bpy.ops.view3d.view_axis(type="FRONT")
+        window.area.spaces.active.region_3d.view_perspective = "PERSP"
+        bpy.ops.view3d.view_all()
+    yield 5
+    from contact_blender.extension.warming import WARMING
+
+    began = time.time()
+    WARMING.begin()
+    while not WARMING.is_done:
+        assert not WARMING.failure, WARMING.failure
+        yield 3
+    window.said.append(f"ready after {time.time() - began:.1f} s")
+    window.base()
+
+
+def take_up(window: Window, name: str) -> None:
+    with window.override():
+        window.bpy.ops.wm.tool_set_by_id(name=f"contact.{name}", space_type="VIEW_3D")
+
+
+def way(window: Window, *places: Any) -> list[tuple[int, int]]:
+    """Window pixels along world points, several between each two."""
+    import numpy as np
+
+    found = []
+    for start, end in pairwise(places):
+        found += [window.on_screen(p) for p in np.linspace(start, end, 6)]
+    return found
+
+
+def bones(window: Window) -> Any:
+    """All channels of all bones, to compare."""
+    rigs = [each for each in window.bpy.data.objects if each.type == "ARMATURE"]
+    return [[round(v, 5) for row in bone.matrix_basis for v in row] for rig in rigs for bone in rig.pose.bones]
+
+
+FINGER = ((4.7, -0.6, 0.0), (5.2, -0.6, 0.0))
+BALL = ((4.8, -1.45, -2.5), (5.3, -1.4, -2.5))
+if os.environ.get("CONTACT_TRY"):
+    FINGER = ((-0.022, -0.02, 0.14), (-0.02, -0.02, 0.155))
+    BALL = ((0.0, -0.155, 0.09), (0.01, -0.155, 0.1))
+
+
+@in_window
+def test_a_day_of_an_artist(window: Window) -> Iterator[Any]:
+    yield from scene(window)
+    window.shown("finger" if "finger" in window.bpy.data.objects else "human_hand")
+    from contact_blender.extension import shared
+
+    session = shared.session()
+    take_up(window, "paint")
+    yield from window.move(*window.on_screen(FINGER[0]))
+    yield 10
+    yield from window.drag(way(window, *FINGER))
+    yield 3
+    window.picture("painted")
+    assert len(session.document.patches) == 1, shared.artist().status()
+    assert not shared.artist().busy
+    assert session.revision == 1
+    yield from window.undo()
+    yield 2
+    assert not session.document.patches and not session.document.surfaces and session.revision == 0
+    yield from window.redo()
+    yield 2
+    assert len(session.document.patches) == 1 and session.revision == 1
+
+    at_rest = bones(window)
+    take_up(window, "transfer")
+    path = way(window, *BALL)
+    yield from window.move(*path[0])
+    yield 10
+    window.send("LEFTMOUSE", "PRESS")
+    yield 2
+    for place in path[1:]:
+        yield from window.move(*place)
+        yield 3
+    window.picture("transferring")
+    assert shared.artist().busy and session.revision == 1
+    assert bones(window) != at_rest, "the hand does not follow"
+    yield from window.key("Z", ctrl=True)
+    assert shared.artist().busy, "Ctrl+Z within a gesture is swallowed"
+    yield from window.key("ESC")
+    yield 2
+    assert not shared.artist().busy and session.revision == 1 and bones(window) == at_rest
+    window.send("LEFTMOUSE", "RELEASE")
+    yield 2
+    yield from window.drag(path)
+    yield 5
+    assert len(session.document.pairs) == 1 and session.revision == 2, shared.artist().status()
+    window.picture("transferred")
+    posed = bones(window)
+    assert posed != at_rest
+    yield from window.undo()
+    yield 2
+    assert bones(window) == at_rest and not session.document.pairs and session.revision == 1
+    yield from window.redo()
+    yield 2
+    assert bones(window) == posed and len(session.document.pairs) == 1
