@@ -12,7 +12,8 @@ import numpy as np
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.transform import transform_points
-from contact_core.hands.description import Digit, DigitBone, HandDescription
+from contact_core.hands.description import Digit, DigitBone, HandDescription, Pad
+from contact_core.hands.pads import side_pad
 from contact_core.rig.capsules import closest_on_segments, fit_capsules
 from contact_core.rig.rig import JointFreedom, Pose, Rig
 from contact_core.solve.body import manipulator_length
@@ -119,6 +120,25 @@ class Hand:
     def digits(self) -> tuple[Digit, ...]:
         """In the order of the arrays: the thumb first."""
         return _ordered(self.description)
+
+    @cached_property
+    def first_finger(self) -> int:
+        """The digit beside the thumb, -1 for a hand without a thumb or without fingers."""
+        return 1 if self.thumb == 0 and len(self.bones) > 2 else -1
+
+    @cached_property
+    def thumbwards(self) -> FloatArray:
+        """(3,) unit, rig space: across the palm to where the thumb is."""
+        thumb, across = self.description.thumb, self.frame[:, 2]
+        reach = 0.0 if thumb is None else float((thumb.tip - self.description.palm.point) @ across)
+        return np.asarray(across * (1.0 if reach >= 0.0 else -1.0))
+
+    @cached_property
+    def side_pad(self) -> Pad | None:
+        """On the side of the first finger, against which the thumb holds a thing as a key is held."""
+        return (
+            None if self.first_finger < 0 else side_pad(self.rig, self.digits[self.first_finger], self.thumbwards)
+        )
 
     @cached_property
     def quick(self) -> Hand:

@@ -20,12 +20,17 @@ if TYPE_CHECKING:
 POINTS, PALM_POINTS = 40, 100
 PLACES, NARROWER = 48, 30  # of the object that are looked at, and the percentile of how wide it is there
 LARGEST, LEAST = 0.4, 0.4  # a pad's radius as a share of that, and of what the hand's description says
+TINY, SPANNED = 0.04, 0.62  # hand lengths that are too small, too thick
+THINNEST = 5  # the percentile of the thickness that is told
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
-def painted_pads(scene: GraspScene, at: FloatArray | None = None) -> tuple[Draft, tuple[str, ...], bool]:
+def painted_pads(
+    scene: GraspScene, at: FloatArray | None = None, sideways: bool = False
+) -> tuple[Draft, tuple[str, ...], bool]:
     """A draft with pads on the hand and none of its contacts with the object, their names, and whether they were
-    only proposed: those may rightly touch nothing. at: (3,) the place that is to be held."""
+    only proposed: those may rightly touch nothing. at: (3,) the place that is to be held. sideways: with one on the
+    side of the first finger."""
     draft = Draft(scene.document, scene.derived, scene.rigs, scene.evaluated)
     for pair in scene.document.pairs.values():
         ends = [scene.document.patch(end).surface for end in (pair.manipulator, pair.object)]
@@ -33,14 +38,16 @@ def painted_pads(scene: GraspScene, at: FloatArray | None = None) -> tuple[Draft
             draft.pairs.remove(pair.name)
             draft.patches.remove(pair.object)
     painted = tuple(n for n, patch in draft.document.patches.items() if patch.surface == scene.hand_name)
-    own = {pad.name for pad in scene.hand.description.pads}
+    pads, beside = scene.hand.description.pads, scene.hand.side_pad
+    pads = (*pads, beside) if sideways and beside is not None else pads
+    own = {pad.name for pad in pads}
     if painted:
         return draft, painted, set(painted) <= own
     mesh = draft.geometry.mesh(scene.hand_name)
     largest = LARGEST * extent(scene, at)
-    for pad in scene.hand.description.pads:
+    for pad in pads:
         draft.patches.paint(pad.name, disk(mesh, pad, largest), surface=scene.hand_name, axis=pad.axis)
-    return draft, tuple(pad.name for pad in scene.hand.description.pads), True
+    return draft, tuple(pad.name for pad in pads), True
 
 
 def extent(scene: GraspScene, at: FloatArray | None) -> float:
@@ -58,3 +65,18 @@ def disk(mesh: TriangleMesh, pad: Pad, largest: float) -> SurfacePoints:
     spokes = radius * np.sqrt(place / (count - 1)) * np.exp(1j * _GOLDEN_ANGLE * place)
     centres = SurfacePoints(np.repeat(pad.centre.faces, count), np.repeat(pad.centre.barycentric, count, axis=0))
     return trace_geodesic(mesh, centres, spokes).points
+
+
+def remark_on_size(scene: GraspScene) -> str:
+    """A sentence on why a hand may find no good grasp: an object too large, too small, or in other units."""
+    length, sides = scene.hand.length, np.ptp(scene.mesh.points[np.unique(scene.mesh.faces)], axis=0)
+    largest = float(sides.max()) / length
+    if largest < TINY:
+        return f"The object is {100 * largest:.2g} % of the hand's length; is its scale right?"
+    found = features_of(scene.mesh, length, PLACES, 0)
+    thinnest = float(np.percentile(np.minimum(found.thickness, found.width), THINNEST)) / length
+    if thinnest > SPANNED:
+        known = np.isfinite(thinnest)
+        thick = f"its thinnest parts are {thinnest:.2g} hand lengths thick" if known else "it is open"
+        return f"The object is {largest:.2g} hand lengths large and {thick}; is its scale right?"
+    return f"The object is {largest:.2g} hand lengths large."

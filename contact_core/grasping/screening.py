@@ -27,9 +27,10 @@ TOUCHING = 0.02  # hand lengths
 
 def first_look(hand: Hand, mesh: TriangleMesh, approaches: Approaches, closed: Closed) -> FloatArray:
     """(N,) the higher the better; -inf where the approach found nothing."""
-    used = approaches.limits >= 1.0  # (N, D)
+    used = approaches.used(hand)  # (N, D)
+    sideways = np.array([kind == "lateral" for kind in approaches.kinds], bool)
     digit = np.repeat(np.arange(len(hand.bones) - 1), np.diff(hand.bones))  # (B,)
-    pads = hand.has_pad[None] & used[:, digit]  # (N, B)
+    pads = hand.has_pad[None] & used[:, digit] & ~(sideways[:, None] & (digit == hand.first_finger))  # (N, B)
     count = np.maximum(pads.sum(axis=1), 1)
     distance = np.abs(closed.fits[:, :, 0]) / hand.length
     fit = (np.minimum(distance / FAR, 1.0) * pads).sum(axis=1) / count
@@ -47,9 +48,9 @@ def first_look(hand: Hand, mesh: TriangleMesh, approaches: Approaches, closed: C
     palm = np.where(held, np.clip((closed.palm / hand.length - 2 * TOUCH) / 0.05, 0.0, 1.0), 0.0)
     value = 1.2 * contact - fit - 0.8 * facing + 0.9 * around - 0.8 * sunk - 0.5 * palm - 0.5 * through
     value = value - 0.35 * uneven(hand, closed.angles, used) - 0.4 * straight(hand, closed.angles, used)
-    value = value - np.where((around < -0.1) & (np.array(approaches.kinds) != "hook"), 0.3, 0.0)
+    value = value - np.where((around < -0.1) & ~sideways & (np.array(approaches.kinds) != "hook"), 0.3, 0.0)
     laid = np.clip((OPPOSED - opposed(hand, closed, used, touched)) / (0.5 * np.pi), 0.0, 1.0)
-    value = value - 0.8 * np.where(np.array(approaches.kinds) != "hook", laid, 0.0)
+    value = value - 0.8 * np.where(sideways | (np.array(approaches.kinds) == "hook"), 0.0, laid)
     if hand.thumb >= 0:  # where it takes part, it shall touch
         value = value - np.where(used[:, hand.thumb] & ~touches[:, hand.thumb], 0.5, 0.0)
     return np.where(np.isfinite(closed.travel), value, -np.inf)

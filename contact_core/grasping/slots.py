@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
+from contact_core.arrays import BoolArray, FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
@@ -16,6 +16,15 @@ from contact_core.grasping.hand import Hand
 
 Kind = Literal["power", "precision", "hook", "lateral", "pinch"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+def lacks(hand: Hand, kind: Kind) -> str | None:
+    """What a hand has not that this kind of grasp needs, None where it can."""
+    if kind in ("precision", "pinch", "lateral") and hand.thumb < 0:
+        return "a thumb that is told from its fingers"
+    if kind == "lateral" and hand.side_pad is None:
+        return "a finger beside its thumb with two bones that bend"
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +66,14 @@ class Approaches:
             raise InvalidInput(f"{n} approaches need as many rigid placements, ways, bars, curls and limits.")
         if not all(np.isfinite(a).all() for a in (self.placed, self.ways, self.bars, self.curls, self.limits)):
             raise InvalidInput("an approach is made of finite numbers.")
+
+    def used(self, hand: Hand) -> BoolArray:
+        """(N, D) which digits take part: those that close all the way, and the finger whose side a thing is held
+        against, which is bent beforehand."""
+        result = self.limits >= 1.0
+        if hand.first_finger >= 0:
+            result[np.array([kind == "lateral" for kind in self.kinds], bool), hand.first_finger] = True
+        return result
 
     def __getitem__(self, rows: Any) -> Approaches:
         rows = np.atleast_1d(rows)

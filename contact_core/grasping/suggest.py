@@ -37,9 +37,9 @@ from contact_core.grasping.facts import (
 from contact_core.grasping.filled import KeepOutTerm, filled
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.metrics import Contact, PosedScene, measure
-from contact_core.grasping.pads import painted_pads
+from contact_core.grasping.pads import painted_pads, remark_on_size
 from contact_core.grasping.screening import distinct, elsewhere, first_look, seen_from
-from contact_core.grasping.slots import KINDS, Approaches, GraspFacts, GraspRequest, GraspScore, Kind
+from contact_core.grasping.slots import KINDS, Approaches, GraspFacts, GraspRequest, GraspScore, Kind, lacks
 from contact_core.grasping.verdict import Verdict, judge, judge_hold
 from contact_core.plugins.registry import GRASP_SAMPLERS, GRASP_SCORES, PLACERS, POSE_TERMS
 from contact_core.plugins.slots import PlacementRequest
@@ -68,6 +68,7 @@ TURNS = ("power", "power", "precision", "power", "pinch", "power", "hook")  # on
 WORSE, HOPELESS = 1.1, -0.6  # a first look that is worse than the best by so much, and below that, is not tried
 NEAR_CELL, NEAR_ROOM = 0.02, 0.12  # hand lengths: of a field round one hand, and how far beyond its skin it goes
 FILLED = 0.2  # hand lengths: what a ball of this radius does not reach is filled
+REACHED = 0.5  # hand lengths: a place to hold that is farther from the object is none of its
 OUTSIDE = 0.015  # hand lengths: a closed hand that is no deeper in the filled object keeps out of all of it
 UNFIT = 0.03  # hand lengths from its place, after solving, at which a proposed pad is given up
 FACES = 0.35  # share of a pad that has to face the object within 45 degrees
@@ -225,11 +226,14 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
     there are not enough others. Raises InvalidInput where the hand can come near the object nowhere, Cancelled."""
     progress.tell(0.0, "Looking at the hand and the object")
     at = None if settings.at is None else np.array(settings.at) * uniform_scale_of(scene)
-    base, pads, proposed = painted_pads(scene, at)
+    kinds = settings.kinds or tuple(kind for kind in USUAL if lacks(scene.hand, kind) is None)
+    _check(scene, settings, at)
+    base, pads, proposed = painted_pads(scene, at, "lateral" in kinds)
     approaches, closed, value, seen = screened(scene, settings, progress.part(0.02, 0.3))
     order = chosen(scene.hand, approaches, value, seen, MOST_TRIED * settings.count)
     if not len(order):
-        raise InvalidInput("the hand found no place at which it touches the object; is the object in its units?")
+        what = f"for a {' or '.join(settings.kinds)} grasp " if settings.kinds else ""
+        raise InvalidInput(f"the hand found no place {what}at which it touches the object. {remark_on_size(scene)}")
     score = scene.plugins.make(GRASP_SCORES, scene.plugins.name_for(GRASP_SCORES, "grasp", settings.score))
     given, poor = list[Suggestion](), list[Suggestion]()
     for place, n in enumerate(order):
@@ -250,6 +254,21 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
     progress.tell(1.0, "Done")
 
 
+def _check(scene: GraspScene, settings: GraspSettings, at: FloatArray | None) -> None:
+    """Raises InvalidInput for kinds that the hand cannot do, and a place that is not on the object."""
+    for kind in settings.kinds:
+        if missing := lacks(scene.hand, kind):
+            name = scene.rig.name
+            raise InvalidInput(f"a {kind} grasp needs {missing}, which {name} has not; ask for power or hook.")
+    if at is not None:
+        away = float(Locator.of(scene.mesh).closest(at[None]).distance[0]) / scene.hand.length
+        if away > REACHED:
+            raise InvalidInput(
+                f"the place to hold is {away:.3g} hand lengths away from the object; name one on it, in its file's"
+                " units."
+            )
+
+
 def screened(
     scene: GraspScene, settings: GraspSettings, progress: Progress = NO_PROGRESS
 ) -> tuple[Approaches, Closed, FloatArray, FloatArray]:
@@ -258,7 +277,7 @@ def screened(
     name = scene.plugins.name_for(GRASP_SAMPLERS, "grasp", settings.sampler)
     sampler = scene.plugins.make(GRASP_SAMPLERS, name, **settings.sampler_settings)
     at = None if settings.at is None else np.array(settings.at) * uniform_scale_of(scene)
-    kinds = settings.kinds or USUAL
+    kinds = settings.kinds or tuple(kind for kind in USUAL if lacks(hand, kind) is None)
     approaches = sampler.sample(GraspRequest(hand, scene.mesh, field, kinds, at, settings.seed))
     progress.tell(0.3, "Closing the hand in many places")
     values = np.zeros(0)
@@ -336,7 +355,7 @@ def _finished(
     start = hand.pose(in_rig, closed.angles[0], closed.starts[0])
     draft.surfaces.set_pose(scene.hand_name, start)
     wanted = _taking_part(scene, approach, pads)
-    return finished(scene, draft, wanted, proposed, approach.kinds[0], approach.limits[0] >= 1.0, score)
+    return finished(scene, draft, wanted, proposed, approach.kinds[0], approach.used(hand)[0], score)
 
 
 def finished(
@@ -407,18 +426,22 @@ def _stands(scene: GraspScene, draft: Draft) -> tuple[FloatArray, TriangleMesh]:
 
 
 def _taking_part(scene: GraspScene, approach: Approaches, pads: tuple[str, ...]) -> tuple[str, ...]:
-    """The pads that this kind of grasp touches with: those of digits that take part, the palm's in a power
-    grasp."""
-    hand, used = scene.hand, approach.limits[0] >= 1.0
+    """The pads that this kind of grasp touches with: those of digits that take part, the palm's in a power grasp,
+    the side of the first finger in place of its others in a lateral one."""
+    hand, used, kind = scene.hand, approach.used(scene.hand)[0], approach.kinds[0]
     roles = {d.role: k for k, d in enumerate(hand.digits)}
     own = {pad.name: pad.role for pad in hand.description.pads}
-    return tuple(
-        name
-        for name in pads
-        if (own.get(name) == "palm" and approach.kinds[0] == "power")
-        or name not in own
-        or (own[name] in roles and used[roles[own[name]]])
-    )
+    beside = None if hand.side_pad is None else hand.side_pad.name
+
+    def counts(name: str) -> bool:
+        if name == beside or own.get(name) == "palm":
+            return kind == ("lateral" if name == beside else "power")
+        digit = roles.get(own.get(name, ""), -1)
+        if digit < 0:
+            return name not in own
+        return bool(used[digit]) and not (kind == "lateral" and digit == hand.first_finger)
+
+    return tuple(name for name in pads if counts(name))
 
 
 def _place(scene: GraspScene, draft: Draft, names: tuple[str, ...]) -> dict[str, str]:

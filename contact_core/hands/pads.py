@@ -12,7 +12,7 @@ from contact_core.rig.rig import Rig
 
 OF_DEPTH = 0.85  # a pad's radius, of how deep the bone lies there
 OF_WIDTH = 0.32  # the palm's, of the width between the outer knuckles
-AT_TIP, AT_MIDDLE = 0.6, 0.5  # where on the last bone, and on others
+AT_TIP, AT_MIDDLE, SIDE = 0.6, 0.5, 0.6  # where on the last bone, on others, and of a pad on the side
 
 
 def pads_of(anatomy: Anatomy, digits: tuple[Digit, ...], palm: Palm, hub: int, width: float) -> tuple[Pad, ...]:
@@ -30,6 +30,19 @@ def pads_of(anatomy: Anatomy, digits: tuple[Digit, ...], palm: Palm, hub: int, w
         pad = _pad(anatomy.rig, "palm", "palm", hub, origin, palm.normal, palm.fingers, radius)
         pads += [pad] if pad is not None else []
     return tuple(pads)
+
+
+def side_pad(rig: Rig, digit: Digit, out: FloatArray) -> Pad | None:
+    """A pad on a finger's side: on its last bone but one, towards `out` (3,) in rig space. It is what a thing is
+    held against by the thumb, as a key is. None for a finger with one bone that bends, or without skin there."""
+    flexing = [k for k, bone in enumerate(digit.bones) if bone.flexes]
+    if len(flexing) < 2:
+        return None
+    bone, after = digit.bones[flexing[-2]], digit.bones[flexing[-1]]
+    here, end = (rig.rest_world[b.joint, :3, 3] for b in (bone, after))
+    along = unit(end - here)
+    origin = here + SIDE * (end - here)
+    return _pad(rig, f"{digit.role} side", digit.role, bone.joint, origin, unit(across(out, along)), along, None)
 
 
 def _below_bone(anatomy: Anatomy, digit: Digit, place: int) -> Pad | None:

@@ -21,6 +21,7 @@ from contact_core.document.schema import dump_document
 from contact_core.edit.command import apply_command
 from contact_core.errors import Cancelled, ContactError, InvalidInput
 from contact_core.geometry.transform import transform_points
+from contact_core.grasping.pads import remark_on_size
 from contact_core.grasping.suggest import GraspScene, GraspSettings, Suggestion, suggest
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.grasping.verdict import DEFINITIONS, spell
@@ -221,7 +222,7 @@ def report_of(
         "hand_length": scene.hand.length,
         "meters_per_unit": scene.rig.meters_per_unit,
         "seed": settings.seed,
-        "summary": summary(found),
+        "summary": summary(found, remark_on_size(scene)),
         "seconds": seconds,
         "grasps": [_entry(one, place + 1) for place, one in enumerate(found)],
         "notes": [*job.notes, *scene.hand.description.notes],
@@ -229,14 +230,15 @@ def report_of(
     }
 
 
-def summary(found: Sequence[Suggestion]) -> str:
+def summary(found: Sequence[Suggestion], size: str = "") -> str:
     """One sentence: how many good grasps there are, and where there is none what keeps the best from being one."""
     good = sum(one.is_grasp for one in found)
     if good:
         return f"{good} good grasp{'s' if good > 1 else ''} of {len(found)} shown."
     if not found:
         return "No grasp was found: the hand reaches the object nowhere with two pads."
-    return f"No good grasp was found; the best of {len(found)} fails: {found[0].verdict.failures[0]}."
+    fails = found[0].verdict.failures[0]
+    return f"No good grasp was found; the best of {len(found)} fails: {fails}. {size}".rstrip()
 
 
 def _entry(one: Suggestion, place: int) -> dict[str, Any]:

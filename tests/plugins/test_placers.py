@@ -11,7 +11,7 @@ import pytest
 from contact_builtins.demos import demo_recipe
 from contact_builtins.placers.closing import STEP, approach, close, search_thumb
 from contact_builtins.placers.from_pose import FACING, FromPose
-from contact_builtins.placers.hand_pose import HandPose, flexion_dof, matching
+from contact_builtins.placers.hand_pose import HandPose, dominant_joint, flexion_dof, matching, palm_and_digits
 from contact_builtins.placers.naive import Naive
 from contact_builtins.placers.pads import pads_of
 from contact_core.arrays import FloatArray
@@ -19,6 +19,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_geodesic
+from contact_core.hands.describe import describe_hand
 from contact_core.job.job import Job
 from contact_core.job.run import perform
 from contact_core.plugins.manager import PluginManager
@@ -27,6 +28,7 @@ from contact_core.rig.poses import curled
 from contact_core.rig.rig import Pose, skin
 from contact_core.rig.rig import forward_kinematics as forward
 from contact_core.settings import configured
+from contact_core.testing import meshes
 from contact_core.testing.settings_checks import check_settings
 
 UPWARD = (0.0, 0.0, 1.0)
@@ -77,6 +79,28 @@ def test_an_approach_ends_at_the_first_touch_wherever_it_starts(start: float) ->
     spacing = hand.fields[0].spacing
     assert 0.0 <= hand.clearance(tested).min() < 0.2 * spacing
     np.testing.assert_allclose(hand.shift, approached().shift, atol=0.2 * spacing)
+
+
+def test_an_approach_is_ended_by_palm_and_digits_and_not_by_the_wrist() -> None:
+    rig = request().rig
+    held = palm_and_digits(rig)
+    assert 0.5 < held.mean() < 1.0 and held[dominant_joint(rig) != 0].all()
+    into_object = request().object_from_rig
+    ball = meshes.icosphere(2, 0.02 * rig.surface.bounding_box_diagonal)
+
+    def before(vertex: int) -> HandPose:
+        at = into_object[:3, :3] @ (rig.surface.points[vertex] + 0.3 * UP) + into_object[:3, 3]
+        mesh = TriangleMesh(ball.points + at, ball.faces)
+        hand = HandPose(replace(request(), object_mesh=mesh, solids=()))
+        approach(hand, UP, matching(hand.rig, ("thumb*",), "test"))
+        return hand
+
+    ahead = rig.surface.points @ describe_hand(rig).palm.fingers
+    wrist, palm = int(ahead.argmin()), int(np.where(held & (dominant_joint(rig) == 0), ahead, -np.inf).argmax())
+    assert not held[wrist]
+    with pytest.raises(InvalidInput, match="passes the object"):
+        before(wrist)
+    assert before(palm).shift @ UP > 0.0
 
 
 def test_closing_stops_at_touch_within_limits_and_moves_nothing_else() -> None:

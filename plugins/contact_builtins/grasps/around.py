@@ -18,11 +18,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from contact_builtins.grasps.opposition import Opposition, oppositions
+from contact_builtins.grasps.opposition import SIDEWAYS, Opposition, oppositions
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.grasping.features import Features, features_of
 from contact_core.grasping.hand import Hand, spread_out
-from contact_core.grasping.slots import Approaches, GraspRequest, Kind
+from contact_core.grasping.slots import Approaches, GraspRequest, Kind, lacks
 from contact_core.settings import HasSettings, setting
 
 SPAN = 0.62  # hand lengths: what is thicker is not spanned
@@ -53,8 +53,7 @@ class Around(HasSettings):
         hand, length = request.hand, request.hand.length
         found = features_of(request.mesh, length, self.places, request.seed, request.at)
         makers = {"power": _power, "hook": _hook, "precision": _tips, "pinch": _tips, "lateral": _tips}
-        wanted = [kind for kind in request.kinds if hand.thumb >= 0 or kind in ("power", "hook")]
-        wanted = wanted or ["power"]
+        wanted = [kind for kind in request.kinds if lacks(hand, kind) is None]
         parts = []
         for kind in wanted:
             made = list(makers[kind](hand, found, kind))
@@ -193,8 +192,8 @@ def _fitting(table: list[Opposition], thick: float) -> list[Opposition]:
 
 def _pinched(hand: Hand, place: Features, one: Opposition, kind: Kind) -> Approaches:
     """One place (a batch of one) between the pads, from both sides and all round."""
-    limits = np.full(len(hand.bones) - 1, RELAXED)
-    limits[list(one.digits)] = 1.0
+    limits = np.full(len(hand.bones) - 1, SIDEWAYS if kind == "lateral" else RELAXED)
+    limits[hand.thumb if kind == "lateral" else list(one.digits)] = 1.0
     line = one.towards  # (3,) rig space, from the thumb's pad to the fingers'
     aside = np.cross(line, hand.frame[:, 1])
     aside = aside / max(float(np.linalg.norm(aside)), 1e-12)

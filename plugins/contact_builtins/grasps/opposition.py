@@ -14,6 +14,7 @@ CURLS = (0.12, 0.2, 0.28, 0.36, 0.44, 0.52, 0.6)  # of their room, that fingers 
 THUMB_CURLS = (0.0, 0.2, 0.4, 0.6)
 TURNED = 0.15  # hand lengths that pads are worth which look past each other
 WIDTHS = 12
+SIDEWAYS = 0.55  # of their room, that fingers are bent whose side holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ def oppositions(hand: Hand, kind: Kind) -> list[Opposition]:
     best: dict[tuple[int, float, bool], Opposition] = {}
     for curl in CURLS:
         if kind == "lateral":
-            curl = 0.55
+            curl = SIDEWAYS
         virtual = [_side(hand, d, curl) if kind == "lateral" else _pad(hand, d, 0, curl) for d in fingers]
         if any(pad is None for pad in virtual) or any(pad is None for pad in thumbs):
             return []
@@ -104,9 +105,6 @@ def _side(hand: Hand, digit: int, share: float) -> tuple[FloatArray, FloatArray]
         return None
     b = flexing[-2]
     frame = _frame(hand, digit, 0, share, b)
-    thumb = hand.description.thumb
-    assert thumb is not None
-    across = hand.frame[:, 2]
-    out = across * np.sign((thumb.tip - hand.description.palm.point) @ across)
+    out = hand.thumbwards
     middle = frame @ np.append(hand.capsules[b].mean(axis=0), 1.0)
     return middle + hand.radii[b] * out, out

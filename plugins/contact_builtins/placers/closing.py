@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact_builtins.placers.hand_pose import HandPose, flexion_dof, matching
+from contact_builtins.placers.hand_pose import HandPose, flexion_dof, matching, palm_and_digits
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
@@ -55,11 +55,12 @@ class Approaching(HasSettings):
 
 
 def approach(hand: HandPose, direction: FloatArray, without: IntArray) -> None:
-    """Move the hand along `direction` (3,) in rig space until skin that no joint of `without` holds touches.
+    """Move the hand along `direction` (3,) in rig space until skin of a palm or digit that no joint of `without`
+    holds touches: a wrist that came first would keep the palm away.
 
     It comes from outside, also when it starts inside the object. Raises InvalidInput when it passes by.
     """
-    tested = np.flatnonzero(~np.isin(hand.owner, without))
+    tested = np.flatnonzero(~np.isin(hand.owner, without) & palm_and_digits(hand.rig))
     if not len(tested):
         raise InvalidInput("the approach leaves out every part of the manipulator; leave some skin to touch with.")
     way = hand.object_from_rig[:3, :3] @ (direction / np.linalg.norm(direction))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fnmatch import fnmatchcase
+from functools import lru_cache
 
 import numpy as np
 
@@ -10,9 +11,13 @@ from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.hands.describe import describe_hands
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.rig.chart import Chart
 from contact_core.rig.rig import ROTATION_DOFS, Pose, Rig, forward_kinematics
+from contact_core.solve.body import manipulator_length
+
+WRIST = 0.12  # hand lengths: skin that lies this far behind where the digits part is no palm
 
 
 class HandPose:
@@ -72,6 +77,22 @@ def dominant_joint(rig: Rig) -> IntArray:
     """(n,) the joint that holds each skin vertex strongest."""
     strongest = rig.skin_weights.argmax(axis=1)
     return np.asarray(rig.skin_joints[np.arange(len(strongest)), strongest])
+
+
+@lru_cache(maxsize=8)
+def palm_and_digits(rig: Rig) -> BoolArray:
+    """(n,) which skin takes hold: that of digits and palm of every hand of a rig, without the wrist behind it and
+    all else of a body; all of it where a rig has no hand."""
+    held, owner = np.zeros(len(rig.bind_points), bool), dominant_joint(rig)
+    for hand in describe_hands(rig):
+        under = np.zeros(len(rig.joints), bool)
+        under[hand.hub] = True
+        for joint, parent in enumerate(rig.parents):
+            under[joint] |= parent >= 0 and under[parent]
+        ahead = (rig.surface.points - rig.rest_world[hand.hub, :3, 3]) @ hand.palm.fingers
+        behind = WRIST * manipulator_length(rig, np.flatnonzero(under)) if hand.palm.is_plane else np.inf
+        held |= under[owner] & (ahead > -behind)
+    return held if held.any() else ~held
 
 
 def matching(rig: Rig, patterns: tuple[str, ...], what: str) -> IntArray:

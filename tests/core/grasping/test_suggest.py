@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,10 @@ import pytest
 from contact_core.cli import main
 from contact_core.document.schema import parse_document as load_document
 from contact_core.errors import Cancelled, InvalidInput
-from contact_core.grasping.suggest import GraspSettings, Suggestion
+from contact_core.grasping.pads import remark_on_size
+from contact_core.grasping.slots import lacks
+from contact_core.grasping.suggest import GraspSettings, Suggestion, suggest
+from contact_core.grasping.verbs import grasp_scene
 from contact_core.job.grasp import HAND, OBJECT, grasp, prepare
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import CallbackProgress
@@ -97,3 +101,37 @@ def test_only_a_hand_can_grasp(session: Session) -> None:
         next(iter(session.suggest(OBJECT, HAND)))
     with pytest.raises(InvalidInput, match="bends"):
         next(iter(session.suggest(HAND, HAND)))
+
+
+def test_a_key_is_held_between_the_thumb_and_the_side_of_the_first_finger() -> None:
+    session = prepare("sample:human_hand", "sample:scissors", 1.0, PluginManager()).session
+    few = {"places": 30, "most": 200}
+    settings = GraspSettings(count=1, kinds=("lateral",), sampler_settings=few)
+    (found,) = session.suggest(HAND, OBJECT, settings=settings)
+    assert found.is_grasp and found.kind == "lateral", found.verdict.failures
+    hand = grasp_scene(session, HAND, OBJECT).hand
+    assert hand.side_pad is not None
+    session.accept(found.proposal)
+    touching = {pair.manipulator for pair in session.document.pairs.values()}
+    assert touching == {hand.side_pad.name, "thumb tip"}
+
+
+def test_a_hand_without_a_thumb_is_told_what_it_cannot(session: Session) -> None:
+    scene = grasp_scene(session, HAND, OBJECT)
+    fingers = replace(scene, hand=replace(scene.hand, thumb=-1))
+    for kind in ("lateral", "pinch", "precision"):
+        assert lacks(scene.hand, kind) is None
+        with pytest.raises(InvalidInput, match=f"a {kind} grasp needs a thumb"):
+            next(suggest(fingers, GraspSettings(1, (kind,))))
+
+
+def test_a_place_that_is_not_on_the_object_is_refused(session: Session) -> None:
+    for far in ((1e9, 0.0, 0.0), (0.0, -3.0, 0.0)):
+        with pytest.raises(InvalidInput, match="hand lengths away from the object"):
+            next(suggest(grasp_scene(session, HAND, OBJECT), GraspSettings(1, at=far)))
+
+
+@pytest.mark.parametrize(("scale", "word"), [(100.0, "thick"), (0.05, "of the hand's length"), (1.0, "large")])
+def test_an_object_of_a_wrong_size_is_told(scale: float, word: str) -> None:
+    session = prepare("sample:human_hand", "sample:baseball", scale, PluginManager()).session
+    assert word in remark_on_size(grasp_scene(session, HAND, OBJECT))
