@@ -23,6 +23,7 @@ from contact_core.hands.describe import describe_hand
 from contact_core.job.job import Job
 from contact_core.job.run import perform
 from contact_core.plugins.manager import PluginManager
+from contact_core.plugins.reading import read_asset
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.rig.poses import curled
 from contact_core.rig.rig import Pose, skin
@@ -82,25 +83,24 @@ def test_an_approach_ends_at_the_first_touch_wherever_it_starts(start: float) ->
 
 
 def test_an_approach_is_ended_by_palm_and_digits_and_not_by_the_wrist() -> None:
-    rig = request().rig
-    held = palm_and_digits(rig)
+    """A small ball before the end of the stump is passed by, one before the palm is not."""
+    rig = read_asset("sample:human_hand", PluginManager()).rig
+    assert rig is not None
+    held, palm = palm_and_digits(rig), describe_hand(rig).palm
     assert 0.5 < held.mean() < 1.0 and held[dominant_joint(rig) != 0].all()
-    into_object = request().object_from_rig
-    ball = meshes.icosphere(2, 0.02 * rig.surface.bounding_box_diagonal)
+    ball = meshes.icosphere(2, 0.01 * rig.surface.bounding_box_diagonal)
 
     def before(vertex: int) -> HandPose:
-        at = into_object[:3, :3] @ (rig.surface.points[vertex] + 0.3 * UP) + into_object[:3, 3]
-        mesh = TriangleMesh(ball.points + at, ball.faces)
-        hand = HandPose(replace(request(), object_mesh=mesh, solids=()))
-        approach(hand, UP, matching(hand.rig, ("thumb*",), "test"))
+        mesh = TriangleMesh(ball.points + rig.surface.points[vertex] + palm.normal, ball.faces)
+        posed = replace(request(), rig=rig, pose=Pose.rest(rig), object_from_rig=np.eye(4))
+        hand = HandPose(replace(posed, object_mesh=mesh, solids=()))
+        approach(hand, palm.normal, matching(rig, ("thumb*",), "test"))
         return hand
 
-    ahead = rig.surface.points @ describe_hand(rig).palm.fingers
-    wrist, palm = int(ahead.argmin()), int(np.where(held & (dominant_joint(rig) == 0), ahead, -np.inf).argmax())
-    assert not held[wrist]
+    ahead = rig.surface.points @ palm.fingers
     with pytest.raises(InvalidInput, match="passes the object"):
-        before(wrist)
-    assert before(palm).shift @ UP > 0.0
+        before(int(ahead.argmin()))
+    assert before(int(np.where(held, ahead, -np.inf).argmax())).shift @ palm.normal > 0.5
 
 
 def test_closing_stops_at_touch_within_limits_and_moves_nothing_else() -> None:
