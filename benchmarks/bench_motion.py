@@ -21,6 +21,7 @@ from contact_core.motion.problem import MotionProblem
 from contact_core.motion.reduction import reduce_poses
 from contact_core.motion.report import motion_report
 from contact_core.motion.solving import MotionSolution, solve_motion
+from contact_core.proposals.motion import held_vertices
 from contact_core.rig.rig import Pose, skin
 
 MM = 1e3
@@ -199,6 +200,14 @@ def keying() -> dict[str, Any]:
         rows[f"120 frames to {kind} keys at 1 mm{' (<= 12)' if kind == 'cubic' else ''}: keys; skin mm; s"] = (
             f"{len(done.keys.frames)}; {MM * rig.meters_per_unit * done.error:.2f}; {seconds:.2f}"
         )
+    held = held_vertices(motion, body, len(rig.faces))
+    done = reduce_poses(rig, motion.frames, poses, held=held)
+    at_frames = zip(motion.posed, motion.frames, strict=True)
+    keyed = np.array([problem.theta_of({body: done.keys.at(rig, frame)}) for problem, frame in at_frames])
+    skate = max(pair.skate_max for pair in motion_report(motion, keyed, solids={}).pairs.values()) / RATE
+    rows["120 frames to cubic keys, contacts within 0.1 mm (<= 12): keys; skate max, mm/frame"] = (
+        f"{len(done.keys.frames)}; {MM * skate:.3f}"
+    )
     window = slice(30, 82)  # two seconds, and two pinned frames on either side
     pins = {f: {body: solution.by_frame[int(f)][body]} for f in (*motion.frames[30:32], *motion.frames[80:82])}
     local = solution.by_frame[55][body].local.copy()

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.chart import pose_on
@@ -34,6 +34,7 @@ from contact_core.solve.penetration import thinned
 MILLIMETRE = 1e-3
 SAMPLES = 500  # vertices that stand for the skin while keys are chosen; all of it has the last word
 NEARLY_HALF_A_CIRCLE = 0.05  # cosine of half the angle
+HELD_SHARE = 0.1  # of the tolerance, for skin that holds something
 STIFFNESS = 1e-3  # how strongly speeds keep to finite differences where frames do not say
 
 
@@ -55,12 +56,15 @@ def reduce_poses(
     tolerance: float | None = None,
     interpolation: Literal["cubic", "linear"] = "cubic",
     keep: Iterable[float] = (),
+    held: Sequence[IntArray] | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> Reduction:
     """Keys that give back poses at frames within a tolerance of the skin.
 
     tolerance: surface units, by default a millimetre. interpolation: "cubic" for curves with handles, "linear" for
     formats that blend straight. keep: frames that get a key whatever the tolerance, such as authored poses.
+    held: per frame the vertices that hold something, which may be a tenth of the tolerance off: within a whole
+    millimetre a planted foot could skate from frame to frame.
     Raises InvalidInput for frames that do not rise, or frames to keep that are not there; Cancelled from progress.
     """
     tolerance = MILLIMETRE / rig.meters_per_unit if tolerance is None else tolerance
@@ -71,11 +75,12 @@ def reduce_poses(
         )
     given = _Given(rig, frames, poses)
     kept = {0, len(given.frames) - 1, *map(given.row, keep)}
-    chosen = set(kept)
+    chosen, held_skin = set(kept), _HeldSkin.of(rig, given, held)
 
     def fits(skin: _Skin, rows: list[int]) -> bool:
         near = given.too_far(rows) is None
-        return near and bool(skin.errors(given.curves(rows, interpolation)).max() <= tolerance)
+        curves = given.curves(rows, interpolation)
+        return near and bool(skin.errors(curves).max() <= tolerance and held_skin.errors(curves).max() <= tolerance)
 
     everything = np.arange(len(rig.bind_points))
     for vertices in (thinned(rig.surface, SAMPLES)[0], everything):
@@ -85,7 +90,8 @@ def reduce_poses(
             if far is not None:
                 chosen.add(far)
                 continue
-            errors = skin.errors(given.curves(sorted(chosen), interpolation))
+            curves = given.curves(sorted(chosen), interpolation)
+            errors = np.maximum(skin.errors(curves), held_skin.errors(curves))
             worst = int(errors.argmax())
             if errors[worst] <= tolerance or worst in chosen:
                 break
@@ -189,16 +195,42 @@ class _Skin:
         self.track = vertex_track(rig, vertices)
         self.bones = _bones(rig, given.local)  # (n, 4 j, 3)
 
-    def errors(self, curves: PoseCurves) -> FloatArray:
-        """(n,) the largest distance at each frame."""
+    def errors(self, curves: PoseCurves, counted: BoolArray | None = None) -> FloatArray:
+        """(n,) the largest distance at each frame. counted: (n, v) which vertices count; all by default."""
         off = _bones(self.rig, curves.sampled(self.frames.tolist())) - self.bones
         columns = off[:, self.track.columns]  # (n, 4 b, 3)
         result = np.empty(len(off))
         step = max(1, 4_000_000 // max(len(self.track), 1))  # frames at a time: some hundred megabytes
         for start in range(0, len(off), step):
             moved = self.track.matrix @ columns[start : start + step]
-            result[start : start + step] = np.sqrt(np.einsum("nvi,nvi->nv", moved, moved).max(axis=1, initial=0.0))
+            squares = np.einsum("nvi,nvi->nv", moved, moved)
+            if counted is not None:
+                squares = np.where(counted[start : start + step], squares, 0.0)
+            result[start : start + step] = np.sqrt(squares.max(axis=1, initial=0.0))
         return result
+
+
+class _HeldSkin:
+    """The vertices that hold something at some frame, with errors counted against their own tolerance."""
+
+    def __init__(self, skin: _Skin, held: BoolArray) -> None:
+        self.skin, self.held = skin, held  # (n, v)
+
+    @classmethod
+    def of(cls, rig: Rig, given: _Given, held: Sequence[IntArray] | None) -> _HeldSkin:
+        """Raises InvalidInput for another number of frames."""
+        rows = held if held is not None else [np.zeros(0, np.int64)] * len(given.frames)
+        if len(rows) != len(given.frames):
+            raise InvalidInput(f"held vertices are said per frame, but got {len(rows)} for {len(given.frames)}.")
+        vertices = np.unique(np.concatenate([np.zeros(0, np.int64), *rows]))
+        mask = np.array([np.isin(vertices, row) for row in rows]).reshape(len(rows), len(vertices))
+        return cls(_Skin(rig, given, vertices), mask)
+
+    def errors(self, curves: PoseCurves) -> FloatArray:
+        """(n,) the largest distance of what is held at each frame, over the share of the tolerance that it has."""
+        if not self.held.any():
+            return np.zeros(len(self.held))
+        return self.skin.errors(curves, self.held) / HELD_SHARE
 
 
 def _bones(rig: Rig, local: FloatArray) -> FloatArray:

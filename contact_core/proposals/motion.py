@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
+from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.document import ContactDocument
 from contact_core.document.staleness import motion_source
 from contact_core.document.timeline import PoseKey, address
 from contact_core.edit.command import Command, Macro, apply_command
 from contact_core.edit.commands import SetKeys
 from contact_core.errors import Cancelled, InvalidInput
+from contact_core.motion.depth import HELD
 from contact_core.motion.problem import MotionBounds, MotionProblem, MotionWeights
 from contact_core.motion.reduction import MILLIMETRE, Reduction, reduce_poses
 from contact_core.motion.report import MotionReport, motion_report
@@ -139,6 +140,7 @@ class _Motion:
         if solution.status is SolveStatus.CANCELLED and not solution.evaluations:
             raise Cancelled("it was cancelled before the first frame was solved; nothing is proposed.")
         poses = {name: self._poses(solution, name) for name in self.posed}
+        self.held = {name: held_vertices(problem, name, len(self.rigs[name].faces)) for name in self.posed}
         cubic = {name: self._reduced(name, poses[name], "cubic") for name in self.posed}
         command = self._command({name: done.keys for name, done in cubic.items()})
         by_frame = _solutions(solution)
@@ -247,7 +249,7 @@ class _Motion:
         keep = [key.frame for key in self._tracks().get(name, ()) if key.is_authored and key.frame in self.frames]
         return reduce_poses(
             rig, self.frames, poses, tolerance=self.motion.tolerance / rig.meters_per_unit,
-            interpolation="cubic" if kind == "cubic" else "linear", keep=keep,
+            interpolation="cubic" if kind == "cubic" else "linear", keep=keep, held=self.held[name],
         )  # fmt: skip
 
     def _command(self, keys: Mapping[str, PoseKeys]) -> Command:
@@ -270,6 +272,18 @@ class _Motion:
 
 def _authored(keys: Sequence[PoseKey]) -> list[float]:
     return [key.frame for key in keys if key.is_authored]
+
+
+def held_vertices(motion: MotionProblem, name: str, faces: int) -> list[IntArray]:
+    """Per frame, the vertices of a rig's skin in contacts that are on; none where it is posed by a proxy."""
+    none = np.zeros(0, np.int64)
+    found = []
+    for problem in motion.problems:
+        surface = problem.bodies[problem.body_index(name)].rig.surface
+        on = [c.manipulator_points for c in problem.contacts if c.manipulator == name and c.gain >= HELD]
+        known = len(surface.faces) == faces
+        found.append(np.unique(np.concatenate([none, *(surface.faces[p.faces].ravel() for p in on if known)])))
+    return found
 
 
 def _pose_in(problem: PoseProblem, name: str) -> Pose:

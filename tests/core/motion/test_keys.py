@@ -172,3 +172,27 @@ def test_what_does_not_fit_is_refused_in_words() -> None:
 
     with pytest.raises(Cancelled):
         reduce_poses(RIG, FRAMES, POSES, tolerance=0.02, progress=CallbackProgress(cancel))
+
+
+def test_what_holds_is_held_closer() -> None:
+    """Vertices that hold something are within a tenth of the tolerance while they do, others within all of it."""
+    tip = np.argsort(RIG.surface.points[:, 1])[-4:]
+    none = np.zeros(0, np.int64)
+    held = [tip if 20.0 <= frame <= 40.0 else none for frame in FRAMES]
+    free, close = (reduce_poses(RIG, FRAMES, POSES, tolerance=0.05, held=each) for each in (None, held))
+    assert close.error <= 0.05 and len(free.keys.frames) < len(close.keys.frames) < len(FRAMES)
+
+    def off(keys: PoseKeys, rows: FloatArray) -> float:
+        worst = 0.0
+        for row in rows.astype(int):
+            one, two = (
+                skin(RIG, forward_kinematics(RIG.parents, pose.local))[tip]
+                for pose in (keys.at(RIG, FRAMES[row]), POSES[row])
+            )
+            worst = max(worst, float(np.linalg.norm(one - two, axis=1).max()))
+        return worst
+
+    rows = np.flatnonzero((FRAMES >= 20.0) & (FRAMES <= 40.0))
+    assert off(close.keys, rows) <= 0.005 * (1 + 1e-9) < off(free.keys, rows)
+    with pytest.raises(InvalidInput, match="per frame"):
+        reduce_poses(RIG, FRAMES, POSES, held=held[:-1])
