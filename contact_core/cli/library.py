@@ -40,11 +40,15 @@ class Library:
         sheet = acts.add_parser("sheet", parents=[again], help="a page with the pictures of all grasps")
         sheet.add_argument("out", type=Path, metavar="FILE", help="the page, .html")
         sheet.add_argument("word", nargs="?", default="", help="only those with it in name, tags, kind or note")
+        making = acts.add_parser(
+            "make", parents=[again], help="make the starter library anew, into an empty folder"
+        )
+        making.add_argument("out", type=Path, metavar="DIR", help="the folder")
         for name, act in acts.choices.items():
             act.set_defaults(act=name)
 
     def run(self, arguments: argparse.Namespace) -> int:
-        acts = {"list": _list, "show": _show, "save": _save, "apply": _apply, "sheet": _sheet}
+        acts = {"list": _list, "show": _show, "save": _save, "apply": _apply, "sheet": _sheet, "make": _make}
         return acts[arguments.act](arguments)
 
 
@@ -198,4 +202,26 @@ def _sheet(arguments: argparse.Namespace) -> int:
     entries = list(library.entries(arguments.word))
     write_atomic(arguments.out, page_of(library, entries, f"{library.folder.name}: {len(entries)} grasps"))
     arguments.output.answer({"page": str(arguments.out), "grasps": len(entries)}, f"page: {arguments.out}")
+    return 0
+
+
+def _make(arguments: argparse.Namespace) -> int:
+    from contact_core.errors import FileRefused
+    from contact_core.library.making import write_starter
+    from contact_core.library.shelf import Library as Shelf
+
+    if arguments.out.exists() and any(arguments.out.iterdir()):
+        raise FileRefused(f"{arguments.out} is not empty; name a new folder.")
+    made = write_starter(Shelf(arguments.out), arguments.plugins, arguments.output)
+    rows = [
+        (
+            " " if one.suggestion.is_grasp else "!",
+            one.type.name,
+            one.type.kind,
+            "; ".join(one.suggestion.verdict.failures),
+        )
+        for one in made
+    ]
+    data = [{"name": one.type.name, "failures": list(one.suggestion.verdict.failures)} for one in made]
+    arguments.output.answer(data, columns(rows))
     return 0
