@@ -207,7 +207,7 @@ def _sheet(arguments: argparse.Namespace) -> int:
 
 def _make(arguments: argparse.Namespace) -> int:
     from contact_core.errors import FileRefused
-    from contact_core.library.making import write_starter
+    from contact_core.job.starter_making import write_starter
     from contact_core.library.shelf import Library as Shelf
 
     if arguments.out.exists() and any(arguments.out.iterdir()):

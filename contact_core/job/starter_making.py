@@ -9,9 +9,7 @@ place, and all is fitted, solved, settled and judged as any grasp is.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,21 +18,19 @@ from contact_core.document.library import ContactSet
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
-from contact_core.geometry.solids import Solid
 from contact_core.geometry.transform import transform_points
 from contact_core.grasping.closing import close_hands
 from contact_core.grasping.hand import STRETCH_PRICE, STRETCHED, Hand, stretches, turn_about
 from contact_core.grasping.pads import disk
-from contact_core.grasping.slots import Kind
 from contact_core.grasping.suggest import GraspScene, Suggestion, finished
 from contact_core.hands.description import Pad
+from contact_core.job.starter import FINGERS, GraspType, starter_types
 from contact_core.library.capture import bone_ends, captured
 from contact_core.library.carrying import palm_in_rig, placed_at
 from contact_core.library.fitting import fitted
 from contact_core.library.pictures import thumbnail
 from contact_core.library.record import PALM, Grasp
 from contact_core.library.shelf import Library
-from contact_core.library.starter import starter_types
 from contact_core.library.verbs import library_scene
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import read_asset
@@ -49,47 +45,6 @@ SAMPLE = "sample:human_hand"
 MM = 1e-3
 ROOM = 0.03  # hand lengths that the bones of the thumb keep from the thing
 WIDTH = 0.55  # of a pad, of half the middle extent of the thing: what hangs over touches nothing
-Bends = tuple[float, float, float]  # degrees that a finger's joints are bent from rest, from the knuckle on
-FINGERS = ("index", "middle", "ring", "little")
-
-
-@dataclass(frozen=True)
-class GraspType:
-    """A type of grasp. number: in the taxonomy. solid: what is held, in metres. bends: of the index to the little
-    finger. digits: those that take part.
-
-    at: the middle of the thing in the palm's frame, millimetres (x out of the palm, y along the fingers, z across,
-    away from a right hand's thumb); None: between the pads of the fingers, `half` before them. axis, across: the
-    palm's directions along which z and x of the thing lie; "line" runs from the first finger's pad to the last's,
-    "normal" the way they look. thumb: (3,) millimetres in the palm's frame, where the thumb's pad is to be; None:
-    opposite the fingers' pads; () for a thumb as it is bent by `thumb_bends`, or as it closes. pads: "tips", "all",
-    or names. spread: degrees, of each finger. sides: pads on the sides of fingers beside those: role, segment, and
-    1 for the side of the thumb, -1 for the other. lead: the fingers whose pads place the thing, those that take
-    part by default, or "side". closes: by digit, thumb first, how far it may close joint by joint, of its room;
-    None: as bent, until it touches.
-    """
-
-    name: str
-    number: int
-    kind: Kind
-    tags: tuple[str, ...]
-    note: str
-    solid: Callable[[], Solid]
-    bends: tuple[Bends, Bends, Bends, Bends]
-    digits: tuple[str, ...]
-    at: tuple[float, float, float] | None = None
-    half: float = 0.0
-    axis: tuple[float, float, float] | Literal["line", "normal"] = (0.0, 0.0, 1.0)
-    across: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    thumb: tuple[float, ...] | None = None
-    thumb_bends: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    pads: str | tuple[str, ...] = "all"
-    palm: bool = False
-    spread: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    lead: tuple[str, ...] = ()
-    closes: tuple[float, float, float, float, float] | None = None
-    sides: tuple[tuple[str, str, float], ...] = field(default=())
-    fit: bool = True
 
 
 @dataclass(frozen=True, eq=False)
