@@ -55,7 +55,7 @@ class GraspType:
 
 
 def starter_types() -> tuple[GraspType, ...]:
-    """What the starter library is made from (`starter_making.write_starter`). Index finger extension (17) was tried and
+    """What the starter library is made from (`starter_making`). Index finger extension (17) was tried and
     left out, for it did not look right; distal type, tripod variation, lateral tripod, stick, palmar, ventral and
     inferior pincer (19, 21, 25, 29, 30, 32, 33) were not tried."""
 
