@@ -34,17 +34,26 @@ class Grasp:
             help="the place of the object to hold, in its file",
         )
         parser.add_argument("--scale", type=finite, default=1.0, help="of the object, where its size is wrong (1)")
+        parser.add_argument("--like", metavar="NAME", help="of a saved grasp: it comes first, where it fits")
+        parser.add_argument(
+            "--library", type=Path, metavar="DIR", help="of --like ($CONTACT_LIBRARY, else the starter library)"
+        )
         parser.add_argument("--seed", type=int, default=0, help="of everything random (0)")
         parser.add_argument("--check", action="store_true", help="exit with 1 when no good grasp was found")
 
     def run(self, arguments: argparse.Namespace) -> int:
+        from contact_core.cli.library import library_of
         from contact_core.grasping.suggest import GraspSettings
         from contact_core.job.grasp import grasp
 
+        like = None
+        if arguments.like is not None:
+            library = library_of(arguments.library)
+            like = library.grasp(arguments.like), library.contacts(arguments.like)
         at = None if arguments.at is None else tuple(arguments.scale * x for x in arguments.at)
         settings = GraspSettings(arguments.count, tuple(arguments.kind or ()), at, arguments.seed)
         result = grasp(
-            arguments.hand, arguments.object, arguments.out, settings, scale=arguments.scale,
+            arguments.hand, arguments.object, arguments.out, settings, scale=arguments.scale, like=like,
             plugins=arguments.plugins, progress=arguments.output,
         )  # fmt: skip
         for note in result.report["notes"]:

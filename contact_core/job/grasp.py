@@ -17,6 +17,7 @@ from contact_core.arrays import FloatArray
 from contact_core.atomic_file import write_atomic
 from contact_core.atomic_set import check_writable, replacing_set
 from contact_core.document.asset import Asset
+from contact_core.document.library import ContactSet
 from contact_core.document.schema import dump_document
 from contact_core.edit.command import apply_command
 from contact_core.errors import Cancelled, ContactError, InvalidInput
@@ -27,6 +28,8 @@ from contact_core.grasping.verbs import grasp_scene
 from contact_core.grasping.verdict import DEFINITIONS, spell
 from contact_core.hands.description import HandWords
 from contact_core.job.standing import object_mesh
+from contact_core.library.like import suggest_like
+from contact_core.library.record import Grasp
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import read_asset
 from contact_core.plugins.registry import RENDERERS
@@ -75,10 +78,12 @@ def grasp(
     settings: GraspSettings,
     *,
     scale: float = 1.0,
+    like: tuple[Grasp, ContactSet] | None = None,
     plugins: PluginManager | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> GraspResult:
-    """Suggest grasps of one file by the hand in another, and write them into `out`. scale: of the object.
+    """Suggest grasps of one file by the hand in another, and write them into `out`. scale: of the object. like: a
+    saved grasp with its contacts, whose like places come first.
 
     Raises ContactError; then nothing is half-written. Cancelled when progress raises it.
     """
@@ -90,7 +95,8 @@ def grasp(
     scene = grasp_scene(job.session, HAND, OBJECT, job.words)
     try:
         found, first = [], 0.0
-        for one in suggest(scene, settings, progress.part(0.05, 0.85)):
+        part = progress.part(0.05, 0.85)
+        for one in suggest(scene, settings, part) if like is None else suggest_like(scene, *like, settings, part):
             first = first or time.perf_counter() - began
             found.append(one)
         found.sort(key=lambda one: -one.score)

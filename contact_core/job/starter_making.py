@@ -87,7 +87,7 @@ def made(one: GraspType, plugins: PluginManager) -> Made:
         local = _closed(hand, one, object_from_palm, scene)
         local = _thumb_placed(hand, one, local, object_from_palm, scene)
         alone = used & (np.arange(len(used)) == hand.thumb)
-        local = fitted(hand, scene.field, local, alone, object_from_palm[:3, 0], False).local
+        local = fitted(hand, scene.field, local, alone, object_from_palm[:3, 0], False, False).local
     elif one.fit:
         local = fitted(hand, scene.field, local, used, object_from_palm[:3, 0], one.palm).local
     draft = Draft(scene.document, scene.derived, scene.rigs, scene.evaluated)

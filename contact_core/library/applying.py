@@ -41,7 +41,7 @@ from contact_core.scene.problem import Objective, world_from_surface
 from contact_core.solve.solver import PoseSolution, SolveStatus
 
 THICKER = 0.3, 3.0  # how far the ratio of a digit's thickness goes from that of the hands
-SOLVED = 2  # of the fitted places, for each grasp that is wanted
+SOLVED, MOST = 2, 4  # of the fitted places for one grasp: where one of them is good, and where none is
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,8 @@ def apply(
     score = scene.plugins.make(GRASP_SCORES, scene.plugins.name_for(GRASP_SCORES, "grasp", None))
     found = list[Applied]()
     for place, (unlike, local) in enumerate(ranked):
-        if len(found) >= SOLVED * count and any(one.suggestion.is_grasp for one in found):
+        enough = len(found) >= (SOLVED if count == 1 else count) and any(one.suggestion.is_grasp for one in found)
+        if enough or place >= max(MOST, count):
             break
         progress.tell(0.3 + 0.7 * place / len(ranked), "Solving and settling")
         draft = base.copy()

@@ -20,6 +20,7 @@ SHARES = np.linspace(-0.7, 0.8, 31)  # of the room of a digit's joints, by which
 STIFF = 0.35  # how much a joint that is straight takes part in curling, of one that is bent
 LOOKS = np.radians([-24.0, -12.0, 0.0, 12.0, 24.0])  # of the thumb's first joint, about two axes
 LOOK_PRICE = 0.03  # hand lengths, for a turn by 24 degrees
+OPPOSE = 0.03  # hand lengths that it is worth that the thumb presses against the other digits
 FAR = 0.06  # hand lengths: pads farther away are not on the object
 PALM_REACH = 0.08  # hand lengths that a palm may back out or come nearer
 
@@ -34,20 +35,29 @@ class Fitted:
 
 
 def fitted(
-    hand: Hand, field: DistanceField, local: FloatArray, used: BoolArray, way: FloatArray, palm: bool
+    hand: Hand,
+    field: DistanceField,
+    local: FloatArray,
+    used: BoolArray,
+    way: FloatArray,
+    palm: bool,
+    looks: bool = True,
 ) -> Fitted:
     """Fit a pose whose root is in the object's space. used: (D,) the digits that take part. way: (3,) unit, out of
-    the palm. palm: whether the palm touches."""
+    the palm. palm: whether the palm touches. looks: whether the thumb may look around."""
     local = _palm_fitted(hand, field, local, way, palm)
     own = forward_kinematics(hand.rig.parents, local)
-    misfit = 0.0
-    for d in range(len(hand.digits)):
-        turns = _looks(hand, d, local) if d == hand.thumb and used[d] else [(np.eye(3), 0.0)]
-        best = min(
-            (_curled(hand, field, own, d, turn, price, bool(used[d])) for turn, price in turns), key=lambda c: c[0]
-        )
+    misfit, pressed = 0.0, list[FloatArray]()
+    for d in sorted(range(len(hand.digits)), key=lambda d: d == hand.thumb):  # the thumb goes against the others
+        thumb = d == hand.thumb and bool(used[d])
+        turns = _looks(hand, d, local) if thumb and looks else [(np.eye(3), 0.0)]
+        against = np.mean(pressed, axis=0) if thumb and pressed else None
+        tried = [_curled(hand, field, own, d, turn, price, bool(used[d]), against) for turn, price in turns]
+        best = min(tried, key=lambda each: each[0])
         local = _with(hand, local, d, best[1], best[2])
         misfit += best[0] * bool(used[d])
+        if used[d] and best[3] is not None:
+            pressed.append(best[3])
     deep = np.maximum(-_clear(hand, field, local), 0.0).sum() / hand.length
     return Fitted(local, misfit / max(int(used.sum()), 1) + float(deep))
 
@@ -94,9 +104,11 @@ def _bends(hand: Hand, local: FloatArray, digit: int) -> tuple[FloatArray, Float
 
 
 def _curled(
-    hand: Hand, field: DistanceField, own: FloatArray, digit: int, turn: FloatArray, price: float, touches: bool
-) -> tuple[float, FloatArray, FloatArray]:
-    """What is amiss, the turn, and the angles (b,) by which a digit's bones are bent further."""
+    hand: Hand, field: DistanceField, own: FloatArray, digit: int, turn: FloatArray, price: float, touches: bool,
+    against: FloatArray | None,
+) -> tuple[float, FloatArray, FloatArray, FloatArray | None]:  # fmt: skip
+    """What is amiss, the turn, the angles (b,) by which a digit's bones are bent further, and the object's normal
+    (3,) where its pads press. against: that of the other digits."""
     local = _local_of(hand, own)
     _, more, less = _bends(hand, local, digit)
     angles = np.where(SHARES[:, None] > 0.0, SHARES[:, None] * more, SHARES[:, None] * less)  # (s, b)
@@ -107,9 +119,11 @@ def _curled(
     points += frames[:, bones][..., :3, 3]
     clear = field.distances(points.reshape(-1, 3)).reshape(len(SHARES), -1).min(axis=1, initial=np.inf)
     s = _where(clear, TOUCH * hand.length, touches)
-    off = _pad_misfit(hand, field, frames[s], digit) if touches else 0.0
+    off, normal = _pad_misfit(hand, field, frames[s], digit) if touches else (0.0, None)
+    if against is not None and normal is not None:
+        off += OPPOSE * 0.5 * float(1.0 + normal @ against)
     sunk = max(-float(clear[s]) / hand.length - TOUCH, 0.0)
-    return off + 2.0 * sunk + price, turn, angles[s]
+    return off + 2.0 * sunk + price, turn, angles[s], normal
 
 
 def _where(clear: FloatArray, touch: float, touches: bool) -> int:
@@ -124,18 +138,22 @@ def _where(clear: FloatArray, touch: float, touches: bool) -> int:
     return start
 
 
-def _pad_misfit(hand: Hand, field: DistanceField, frames: FloatArray, digit: int) -> float:
-    """How far the pads of a digit are from the object and from facing it, in hand lengths a pad."""
+def _pad_misfit(
+    hand: Hand, field: DistanceField, frames: FloatArray, digit: int
+) -> tuple[float, FloatArray | None]:
+    """How far the pads of a digit are from the object and from facing it, in hand lengths a pad, and the object's
+    normal (3,) there."""
     rows = np.flatnonzero(hand.has_pad[hand.bones[digit] : hand.bones[digit + 1]])
     if not len(rows):
-        return 0.0
+        return 0.0, None
     b = rows + hand.bones[digit]
     at = np.einsum("bij,bj->bi", frames[rows, :3, :3], hand.pads[b]) + frames[rows, :3, 3]
     normals = np.einsum("bij,bj->bi", frames[rows, :3, :3], hand.pad_normals[b])
     distance, slope = field.sample(at)
     size = np.maximum(np.linalg.norm(slope, axis=1), 1e-9)
     facing = 0.5 * (1.0 + np.einsum("bi,bi->b", normals, slope) / size)
-    return float((np.minimum(np.abs(distance) / hand.length, FAR) + 0.05 * facing).mean())
+    off = float((np.minimum(np.abs(distance) / hand.length, FAR) + 0.05 * facing).mean())
+    return off, np.asarray((slope / size[:, None]).mean(axis=0))
 
 
 def _frames(hand: Hand, own: FloatArray, digit: int, turn: FloatArray, angles: FloatArray) -> FloatArray:

@@ -82,3 +82,12 @@ def test_the_environment_names_the_library(
     monkeypatch.setenv("CONTACT_LIBRARY", str(tmp_path / "studio"))
     assert main(["library", "list"]) == 0
     assert capsys.readouterr().out.split()[:3] == ["ball", "v1", "power"]
+
+
+def test_suggestions_begin_with_a_saved_grasp(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["grasp", "sample:human_hand", "sample:baseball", "--like", "power sphere", "--count", "1"]
+    assert main([*line, "--out", str(tmp_path / "out"), "--json"]) == 0
+    (entry,) = json.loads(capsys.readouterr().out)["report"]["grasps"]
+    assert entry["kind"] == "power" and entry["verdict"] == "grasp"
+    assert main([*line, "--out", str(tmp_path / "no"), "--library", str(tmp_path)]) == 2
+    assert "has no grasp 'power sphere'" in capsys.readouterr().err

@@ -28,7 +28,7 @@ def test_every_type_is_shipped_with_its_picture_and_no_other() -> None:
         assert 5_000 < len(library.picture(entry.name) or b"") < 150_000
 
 
-@pytest.mark.parametrize("one", [TYPES[name] for name in ("lateral", "small diameter")], ids=lambda t: t.name)
+@pytest.mark.parametrize("one", [TYPES[name] for name in ("lateral", "medium wrap")], ids=lambda t: t.name)
 def test_what_is_shipped_is_what_the_script_makes(one: GraspType, plugins: PluginManager) -> None:
     shipped, again = starter_library().grasp(one.name), made(one, plugins)
     assert again.suggestion.is_grasp, again.suggestion.verdict.failures
