@@ -20,6 +20,7 @@ FACES = -0.3  # n.n' of skin that presses on the object
 POINTS = 16  # of contact, for closure
 STRAIGHT = np.radians(40.0)  # all joints of a finger together: less is no bend that holds
 DIRECTIONS = 96
+LOOP_REACH = 0.2  # hand lengths from the place that is to be held to a finger through the loop there
 BACK = (0.06, 0.12, 0.2, 0.3)  # hand lengths of the way back out
 
 
@@ -122,6 +123,21 @@ def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray
         if digit != hand.thumb and touching and len(against):
             angles.append(float(np.arccos(np.clip((against @ means[touching[-1]]).min(), -1.0, 1.0))))
     return float(np.median(angles)) if angles else 0.0
+
+
+def through_loops(
+    hand: Hand, frames: FloatArray, field: DistanceField, solid: DistanceField, at: FloatArray
+) -> BoolArray:
+    """(N, D) which digits reach into a hollow near a place: bones in what is filled of the object (`filled`) and is
+    not it, as a finger through a handle is. frames: (N, B, 4, 4) of bones in the object's space; at: (3,)."""
+    ends = np.einsum("nbij,bej->nbei", frames[:, :, :3, :3], hand.capsules) + frames[:, :, None, :3, 3]
+    points = np.stack([ends[:, :, 0], ends.mean(axis=2), ends[:, :, 1]], axis=2)  # (N, B, 3, 3)
+    flat = points.reshape(-1, 3)
+    near = np.linalg.norm(flat - at, axis=1) < LOOP_REACH * hand.length
+    inside = near.copy()
+    inside[near] = (field.distances(flat[near]) > 0.0) & (solid.distances(flat[near]) < 0.0)
+    by_bone = inside.reshape(points.shape[:3]).any(axis=2) & hand.flexes
+    return np.asarray(np.logical_or.reduceat(by_bone, hand.bones[:-1], axis=1))
 
 
 def crossing(hand: Hand, world: FloatArray) -> float:

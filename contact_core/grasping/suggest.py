@@ -32,6 +32,7 @@ from contact_core.grasping.facts import (
     digits_in_contact,
     opposition,
     skin_through,
+    through_loops,
     uneven_curl,
 )
 from contact_core.grasping.filled import KeepOutTerm, filled
@@ -65,6 +66,7 @@ MOST_TRIED = 3  # times as many as are wanted are solved at most
 SECOND_LOOK = 220  # approaches that are closed with all starts of the thumb
 MORE = {"power": 3.0}  # times as many approaches of a kind as of others
 TURNS = ("power", "power", "precision", "power", "pinch", "power", "hook")  # one after the other
+THREADED = 0.3  # what each finger through a loop at the place to hold is worth to a first look
 WORSE, HOPELESS = 1.1, -0.6  # a first look that is worse than the best by so much, and below that, is not tried
 NEAR_CELL, NEAR_ROOM = 0.02, 0.12  # hand lengths: of a field round one hand, and how far beyond its skin it goes
 FILLED = 0.2  # hand lengths: what a ball of this radius does not reach is filled
@@ -128,7 +130,8 @@ class GraspSettings:
 class GraspScene:
     """The document, its hand and its object, and what solves there. hand_name, object_name: of their surfaces.
     prior: what draws the digits that touch nothing: the closed hand with its thumb at rest ("closed"), or
-    the pose from which a solve starts ("current")."""
+    the pose from which a solve starts ("current"). at: (3,) the place that is to be held, in the object's space in
+    the hand's units, if one was named."""
 
     document: ContactDocument
     derived: Derived
@@ -140,6 +143,7 @@ class GraspScene:
     revision: int = 0
     evaluated: Mapping[str, HostRig] | None = None
     prior: Literal["closed", "current"] = "closed"
+    at: FloatArray | None = None
 
     @property
     def rig(self) -> Rig:
@@ -228,6 +232,7 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
     at = None if settings.at is None else np.array(settings.at) * uniform_scale_of(scene)
     kinds = settings.kinds or tuple(kind for kind in USUAL if lacks(scene.hand, kind) is None)
     _check(scene, settings, at)
+    scene = replace(scene, at=at)
     base, pads, proposed = painted_pads(scene, at, "lateral" in kinds)
     approaches, closed, value, seen = screened(scene, settings, progress.part(0.02, 0.3))
     order = chosen(scene.hand, approaches, value, seen, MOST_TRIED * settings.count)
@@ -283,15 +288,30 @@ def screened(
     values = np.zeros(0)
     if len(approaches.kinds):
         rough = _closed(hand.quick, field, approaches)
-        values = first_look(hand, scene.mesh, approaches, rough) - elsewhere(hand, rough, at)
+        values = (
+            first_look(hand, scene.mesh, approaches, rough) - elsewhere(hand, rough, at) + _threaded(scene, rough)
+        )
         best = _shared_out(approaches, values, SECOND_LOOK)
         approaches = approaches[best]
     progress.tell(0.6, "Turning the thumb")
     closed = _closed(hand, field, approaches)
     value = values
     if len(approaches.kinds):
-        value = first_look(hand, scene.mesh, approaches, closed) - elsewhere(hand, closed, at)
+        value = (
+            first_look(hand, scene.mesh, approaches, closed)
+            - elsewhere(hand, closed, at)
+            + _threaded(scene, closed)
+        )
     return approaches, closed, value, seen_from(hand, field, closed.placed)
+
+
+def _threaded(scene: GraspScene, closed: Closed) -> FloatArray:
+    """(N,) what fingers through a loop at the place that is to be held are worth; nothing without a place."""
+    if scene.at is None:
+        return np.zeros(len(closed.placed))
+    frames = scene.hand.frames(closed.placed, closed.angles, closed.starts)
+    through = through_loops(scene.hand, frames, scene.field, scene.solid, scene.at)
+    return np.asarray(THREADED * np.minimum(through.sum(axis=1), 4))
 
 
 def uniform_scale_of(scene: GraspScene) -> float:
@@ -516,6 +536,7 @@ def judged(
         "uneven_curl_deg": float(np.degrees(uneven_curl(hand, angles, used & touching))),
         "opposition_deg": float(np.degrees(opposition(hand, posed.points, scene.mesh, used))),
         "crossing": crossing(hand, world),
+        "digits_through": _digits_through(scene, world),
         "closure": closure(contact_wrenches(posed, scene.mesh, hand.length)),
     }
     verdict = judge(metrics, {} if proposed else left_out, {})
@@ -535,6 +556,14 @@ def judged(
     )
     seen = seen_from(hand, scene.field, placed[None])[0]
     return Suggestion(proposal, kind, facts, verdict, float(score.score(facts)), left_out, posed, placed, way, seen)
+
+
+def _digits_through(scene: GraspScene, world: FloatArray) -> int:
+    """How many digits go through a loop at the place that was to be held; none where no place was named."""
+    if scene.at is None:
+        return 0
+    frames = world[scene.hand.joints][None]
+    return int(through_loops(scene.hand, frames, scene.field, scene.solid, scene.at).sum())
 
 
 def _local(rig: Rig, pose: Pose) -> FloatArray:

@@ -34,6 +34,7 @@ GOOD: dict[str, Any] = {
     "uneven_curl_deg": 15.0,
     "opposition_deg": 150.0,
     "crossing": 0.0,
+    "digits_through": 0,
     "closure": 0.1,
 }
 
