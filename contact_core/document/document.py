@@ -21,6 +21,7 @@ from contact_core.document.timeline import FILM, Span, Timeline, Track, gain_of,
 from contact_core.errors import CommandRejected, InvalidInput, quoted
 from contact_core.geometry.transform import is_rigid
 from contact_core.rig.rig import Pose
+from contact_core.solve.body import Hold, check_hold
 
 Color = tuple[float, float, float]
 MAX_NAME = 200
@@ -121,6 +122,7 @@ class ContactPair:
     """Two patches that are to touch, how much this pair counts, and how far it is on.
 
     gain: 0 is off, 1 is on; unlike weights, the gain of one pair leaves the others as strong as they were.
+    hold: points meet and may face anywhere ("point"), face each other at any distance ("direction"), or "both".
     """
 
     name: str
@@ -128,6 +130,7 @@ class ContactPair:
     object: str
     weight: float = 1.0
     gain: float = 1.0
+    hold: Hold = "both"
 
     def __post_init__(self) -> None:
         check_name(self.name, "a pair")
@@ -137,6 +140,7 @@ class ContactPair:
             raise InvalidInput(f"the weight of a pair is not negative, but got {self.weight}.")
         if not 0.0 <= self.gain <= 1.0:
             raise InvalidInput(f"the gain of a pair is 0..1, but got {self.gain}.")
+        check_hold(self.hold)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +196,8 @@ class ContactDocument:
             else:
                 poses[name] = track.pose_at(frame)
         for name, spans in self.spans.items():
-            pairs[name] = replace(pairs[name], gain=gain_of(spans, frame))
+            held = max(spans, key=lambda span: span.gain(frame))
+            pairs[name] = replace(pairs[name], gain=gain_of(spans, frame), hold=held.hold)
         return replace(
             self,
             surfaces=FrozenMap(surfaces),

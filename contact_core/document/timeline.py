@@ -23,6 +23,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.transform import is_rigid
 from contact_core.motion.placement_keys import INTERPOLATIONS, Interpolation, PlacementKey, PlacementKeys
 from contact_core.rig.rig import Pose
+from contact_core.solve.body import Hold, check_hold
 
 if TYPE_CHECKING:
     from contact_core.rig.pose_keys import PoseKeys
@@ -69,18 +70,21 @@ class Timeline:
 @dataclass(frozen=True, slots=True)
 class Span:
     """A contact that holds from frame `on` to frame `off`. It fades in over `ease_in` frames before, and out over
-    `ease_out` frames after."""
+    `ease_out` frames after. hold: what holds: the "point", as a ball of the foot that turns, the "direction", as a
+    palm over a ball, or "both"."""
 
     on: float
     off: float
     ease_in: float = 0.0
     ease_out: float = 0.0
+    hold: Hold = "both"
 
     def __post_init__(self) -> None:
         if not -math.inf < self.on <= self.off < math.inf:
             raise InvalidInput(f"a span runs from a frame to a later one, but got {self.on} to {self.off}.")
         if not (0.0 <= self.ease_in < math.inf and 0.0 <= self.ease_out < math.inf):
             raise InvalidInput(f"a span eases over 0 frames or more, but got {self.ease_in}, {self.ease_out}.")
+        check_hold(self.hold)
 
     def gain(self, frame: float) -> float:
         """0..1 how far the contact is on: a minimum-jerk ramp (Flash and Hogan 1985) on either side."""

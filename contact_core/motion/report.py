@@ -34,7 +34,7 @@ class PairOverTime:
 
 @dataclass(frozen=True)
 class MotionReport:
-    """A motion in figures. pairs: by name, those that are ever on.
+    """A motion in figures. pairs: by name, those whose points are ever held.
 
     joint_acceleration: peak of any angle, rad/s^2, root apart. pad_acceleration: peak of any contact's centre on
     the manipulator, world units/s^2; jerk_rms: root mean square of its third derivative, world units/s^3.
@@ -99,7 +99,7 @@ def _pairs(motion: MotionProblem, states: Sequence[PoseState]) -> dict[str, Pair
     for row, (problem, state) in enumerate(zip(motion.posed, states, strict=True)):
         gaps = ObjectGaps(problem).values(state)
         for contact in problem.contacts:
-            if contact.gain >= HELD and len(contact.weights):
+            if contact.gain >= HELD and len(contact.weights) and contact.hold != "direction":
                 own = gaps[problem.pairs.rows[contact.name]]
                 distances.setdefault(contact.name, []).append(np.linalg.norm(own, axis=1))
                 centres.setdefault(contact.name, []).append(own.mean(axis=0))

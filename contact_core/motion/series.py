@@ -64,7 +64,7 @@ def motion_series(
         state, now = problem.state(theta), dict[str, FloatArray]()
         gaps = ObjectGaps(problem).values(state)
         for contact in problem.contacts:
-            if contact.gain < HELD or not len(contact.weights):
+            if contact.gain < HELD or not len(contact.weights) or contact.hold == "direction":
                 continue
             own = gaps[problem.pairs.rows[contact.name]]
             errors[contact.name][row] = np.linalg.norm(own, axis=1).mean()

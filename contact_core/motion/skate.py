@@ -77,7 +77,7 @@ def held_rows(before: PoseProblem, then: PoseProblem) -> Slip:
     known = {contact.name: contact for contact in before.contacts}
     for contact in then.contacts:
         other = known.get(contact.name)
-        if other is None or len(other.weights) != len(contact.weights):
+        if other is None or len(other.weights) != len(contact.weights) or contact.hold == "direction":
             continue
         gain = min(other.gain, contact.gain)
         if gain >= HELD and total > 0.0:

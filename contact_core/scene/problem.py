@@ -91,6 +91,7 @@ def contact_of(pair: PairGeometry) -> PairedPoints:
         pair.object_points,
         pair.weights,
         pair.pair.gain,
+        pair.pair.hold,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -62,12 +63,23 @@ class Body:
         return cls(name, Rig.rigid(name, black_box.surface, movable=False), start, np.eye(4), black_box)
 
 
+Hold: TypeAlias = Literal["both", "point", "direction"]
+HOLDS: tuple[Hold, ...] = ("both", "point", "direction")
+
+
+def check_hold(hold: str) -> None:
+    """Raises InvalidInput for what cannot be held."""
+    if hold not in HOLDS:
+        raise InvalidInput(f"a contact holds {', '.join(HOLDS)}, but got {hold!r}.")
+
+
 @dataclass(frozen=True, eq=False)
 class PairedPoints:
     """One contact pair as a solver sees it: k points on one body that shall meet k points on another (or itself).
 
     manipulator, object: names of bodies. weights: (k,) relative weight of each point, by default 1 (give
-    areas where points stand for unequal ones); distances are averaged over the weights of all pairs.
+    areas where points stand for unequal ones); distances are averaged over the weights of all pairs. gain: 0 is
+    off. hold: what holds, the "point"s, which may face anywhere, the "direction", at any distance, or "both".
     """
 
     name: str
@@ -77,8 +89,10 @@ class PairedPoints:
     object_points: SurfacePoints
     weights: FloatArray = field(default_factory=lambda: np.ones(0))
     gain: float = 1.0
+    hold: Hold = "both"
 
     def __post_init__(self) -> None:
+        check_hold(self.hold)
         k = len(self.manipulator_points)
         if len(self.object_points) != k:
             raise InvalidInput(

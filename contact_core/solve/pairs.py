@@ -23,7 +23,8 @@ class Pairs:
 
     manipulator_points, object_points, and their normals: the two ends. gap: the first minus the second.
     weights: (k,) of each point its share of the weights of all pairs, times the gain of its own pair; sum 1 while
-    every gain is 1. rows: which rows are whose.
+    every gain is 1, and 0 for pairs that hold a direction alone. facing: (k,) the same for their normals, 0 for
+    pairs that hold points alone. rows: which rows are whose.
     """
 
     manipulator_points: Track
@@ -32,6 +33,7 @@ class Pairs:
     object_normals: Track
     gap: Track
     weights: FloatArray
+    facing: FloatArray
     rows: Mapping[str, slice]
 
 
@@ -43,10 +45,11 @@ def pairs_of(problem: PoseProblem) -> Pairs:
     """
     if not problem.contacts:
         points, normals = Track.empty(4), Track.empty(3)
-        return Pairs(points, points, normals, normals, points, np.zeros(0), {})
+        return Pairs(points, points, normals, normals, points, np.zeros(0), np.zeros(0), {})
     shares = np.concatenate([contact.weights for contact in problem.contacts])
     gains = np.repeat([c.gain for c in problem.contacts], [len(c.weights) for c in problem.contacts])
     weights = gains * shares / max(float(shares.sum()), np.finfo(float).tiny)
+    holds = np.repeat([c.hold for c in problem.contacts], [len(c.weights) for c in problem.contacts])
     ends = np.cumsum([0, *(len(contact.weights) for contact in problem.contacts)])
     rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(problem.contacts)}
     manipulators = [(contact.manipulator, contact.manipulator_points) for contact in problem.contacts]
@@ -54,7 +57,9 @@ def pairs_of(problem: PoseProblem) -> Pairs:
     first, first_normals = _tracks(problem, manipulators, as_object=False)
     second, second_normals = _tracks(problem, objects, as_object=True)
     gap = first.combined(second, -1.0)
-    return Pairs(first, second, first_normals, second_normals, gap, weights, rows)
+    return Pairs(first, second, first_normals, second_normals, gap, np.where(holds == "direction", 0.0, weights),
+        np.where(holds == "point", 0.0, weights), rows,
+    )  # fmt: skip
 
 
 def _tracks(

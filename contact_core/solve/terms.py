@@ -156,7 +156,7 @@ class NormalTerm(HasSettings):
 class _Normals:
     def __init__(self, term: NormalTerm, problem: PoseProblem) -> None:
         self.first, self.second = problem.pairs.manipulator_normals, problem.pairs.object_normals
-        self.factors = term.weight * problem.pairs.weights  # (k,)
+        self.factors = term.weight * problem.pairs.facing  # (k,)
         # Lengths change little where skin bends and not at all elsewhere: as of the start, they keep the
         # Gauss-Newton matrix constant in the bones. Value and gradient are exact.
         start = problem.start_state

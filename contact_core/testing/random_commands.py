@@ -22,6 +22,7 @@ from contact_core.edit.history import History
 from contact_core.errors import CommandRejected
 from contact_core.motion.placement_keys import PlacementKey
 from contact_core.rig.rig import Pose
+from contact_core.solve.body import HOLDS
 from contact_core.testing.random_values import (
     Rng,
     moved_placement,
@@ -359,8 +360,11 @@ def clear_track(document: ContactDocument, rng: Rng) -> Command | None:
 def set_spans(document: ContactDocument, rng: Rng) -> Command | None:
     name = pick(rng, list(document.pairs))
     ends = np.sort(rng.choice(100, 2 * int(rng.integers(0, 3)), replace=False)).astype(float).reshape(-1, 2)
-    spans = tuple(Span(on, off, *rng.uniform(0.0, 12.0, 2).tolist()) for on, off in ends.tolist())
-    return name and kinds.SetSpans(name, spans)
+    spans = []
+    for on, off in ends.tolist():
+        rise, fall = rng.uniform(0.0, 12.0, 2).tolist()
+        spans.append(Span(on, off, rise, fall, HOLDS[int(on) % 3]))
+    return name and kinds.SetSpans(name, tuple(spans))
 
 
 def macro(document: ContactDocument, rng: Rng) -> Command | None:

@@ -32,6 +32,7 @@ from contact_core.edit.verbs.keying import Keying, TimedEditor, completed, held,
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.motion.placement_keys import Interpolation, PlacementKey, PlacementKeys
 from contact_core.rig.pose_keys import PoseKeys
+from contact_core.solve.body import Hold
 
 SpanPart = Literal["on", "off", "ease_in", "ease_out", "all"]
 EASE = 0.4  # seconds over which a contact fades in and out by default
@@ -210,15 +211,27 @@ class Film:
     # --- spans --------------------------------------------------------------------------------------------------
 
     def hold(
-        self, pair: str, on: float, off: float, *, ease_in: float | None = None, ease_out: float | None = None
+        self,
+        pair: str,
+        on: float,
+        off: float,
+        *,
+        ease_in: float | None = None,
+        ease_out: float | None = None,
+        hold: Hold = "both",
     ) -> None:
         """A pair holds from one frame to another, in place of its spans that overlap this one.
 
-        ease_in, ease_out: frames over which it fades in before, and out after; by default 0.4 seconds.
+        ease_in, ease_out: frames over which it fades in before, and out after; by default 0.4 seconds. hold: what
+        holds: the "point", which may turn, the "direction", at any distance, or "both".
         """
         ramp = EASE * self.settings.frames_per_second
         new = Span(
-            float(on), float(off), ramp if ease_in is None else ease_in, ramp if ease_out is None else ease_out
+            float(on),
+            float(off),
+            ramp if ease_in is None else ease_in,
+            ramp if ease_out is None else ease_out,
+            hold,
         )
         others = [span for span in self.spans(pair) if span.off < new.on or new.off < span.on]
         self.set_spans(pair, (*others, new))

@@ -222,3 +222,14 @@ def test_files_that_contradict_themselves_over_time_are_refused(says: str, field
     data[field] = value
     with pytest.raises(FileRefused, match=says):
         parse_document(json.dumps(data).encode())
+
+
+def test_a_span_says_what_it_holds() -> None:
+    document = timed(5)
+    spans = (Span(0.0, 10.0, 2.0, 4.0, "point"), Span(15.0, 20.0, 4.0, 2.0, "direction"))
+    held = SetSpans("timed", spans).apply(document)
+    found = [held.at(frame).pairs["timed"].hold for frame in (5.0, 11.0, 14.0, 18.0)]
+    assert found == ["point", "point", "direction", "direction"]  # of the one that is farther on
+    assert parse_document(dump_document(held)).spans["timed"] == spans
+    with pytest.raises(InvalidInput, match="holds"):
+        Span(0.0, 1.0, hold="nothing")  # type: ignore[arg-type]

@@ -22,6 +22,7 @@ from contact_core.rig.rig import Pose
 from contact_core.rig.rotations import exponential
 from contact_core.solve.box import box_minimum
 from contact_core.solve.solver import SolveStatus
+from contact_core.solve.terms import DistanceTerm, NormalTerm, paper_terms
 from contact_core.testing.motions import eased, molded
 
 # --- linear algebra -----------------------------------------------------------------------------------------
@@ -357,3 +358,24 @@ def test_what_does_not_fit_is_refused_in_words() -> None:
 def test_iterations_that_run_out_are_said() -> None:
     motion: MotionProblem = molded(1.0, gain=fading, pins={0.0: {"tentacle": moved_pose(12.0)}})
     assert solve_motion(motion, options=MotionOptions(max_iterations=1)).status is SolveStatus.STOPPED
+
+
+def test_what_a_contact_holds_is_what_it_counts() -> None:
+    """The point: its normals are free. The direction: it may be anywhere, and slips nowhere. Both: all of it."""
+    base = molded(0.2, weights=MotionWeights(skate=1.0))
+
+    def parts(hold: str) -> tuple[float, float, float]:
+        problems = tuple(
+            replace(p, contacts=tuple(replace(c, hold=hold) for c in p.contacts), terms=paper_terms())
+            for p in base.problems
+        )
+        state = problems[-1].start_state
+        distance, normal = (term.bind(problems[-1]).value(state) for term in (DistanceTerm(), NormalTerm()))
+        objective = JointObjective(replace(base, problems=problems))
+        return distance, normal, objective.parts([p.start_state for p in problems])["skate"]
+
+    both, point, direction = (parts(hold) for hold in ("both", "point", "direction"))
+    assert min(both) > 0.0
+    assert point == (both[0], 0.0, both[2]) and direction == (0.0, both[1], 0.0)
+    with pytest.raises(InvalidInput, match="holds"):
+        parts("nothing")
