@@ -63,6 +63,11 @@ def test_a_press_is_one_step_of_undo(window: Window) -> Iterator[Any]:
     assert turned is not before
     yield from window.scroll_down()
     yield from window.press("contact.solve(")
+    for _ in range(2000):  # it runs beside the window
+        if session.document is not turned:
+            break
+        yield
+    yield 3
     solved = session.document
     bones = next(each for each in window.bpy.data.objects if each.type == "ARMATURE").pose.bones
     bent = [tuple(bone.matrix_basis.to_quaternion()) for bone in bones]

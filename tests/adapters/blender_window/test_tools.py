@@ -131,3 +131,81 @@ def test_a_day_of_an_artist(window: Window) -> Iterator[Any]:
     yield from window.redo()
     yield 2
     assert bones(window) == posed and len(session.document.pairs) == 1
+
+
+@in_window
+def test_solving_beside_the_window(window: Window) -> Iterator[Any]:
+    """Without following: Solve by its key is a ghost on the bones; Escape leaves it, Enter keeps it as one step."""
+    yield from scene(window)
+    from contact_blender.extension import shared
+
+    session = shared.session()
+    window.bpy.context.window_manager.contact_tools.all.live = False
+    take_up(window, "paint")
+    yield from window.drag(way(window, *FINGER))
+    take_up(window, "transfer")
+    yield from window.drag(way(window, *BALL))
+    yield 3
+    artist, at_rest, revision = shared.artist(), bones(window), session.revision
+    assert len(session.document.pairs) == 1 and revision == 2, artist.status()
+    for kept in (False, True):
+        yield from window.over_view()
+        yield from window.key("RET", ctrl=True)
+        assert artist.busy, "Ctrl+Enter begins to solve"
+        for _ in range(2000):
+            if artist.interaction.proposing.proposal is not None:
+                break
+            yield
+        yield 3
+        assert bones(window) != at_rest and session.revision == revision
+        if kept:
+            window.picture("proposed")
+        yield from window.key("RET" if kept else "ESC")
+        yield 3
+        assert not artist.busy and session.revision == revision + kept
+        assert (bones(window) != at_rest) == kept
+    yield from window.undo()
+    yield 2
+    assert bones(window) == at_rest and session.revision == revision
+    yield from window.key("RET", ctrl=True)
+    yield from window.key("ESC")  # at once: the work stops
+    yield from window.key("ESC")
+    for _ in range(200):
+        if not artist.busy:
+            break
+        yield
+    assert not artist.busy and bones(window) == at_rest and session.revision == revision
+
+
+@in_window
+def test_what_a_move_of_the_mouse_costs(window: Window) -> Iterator[Any]:
+    """Tells milliseconds of our own work in a drag, drawing not counted; no handler of the depsgraph is there."""
+    yield from scene(window)
+    from contact_blender.extension import shared
+
+    take_up(window, "paint")
+    yield from window.drag(way(window, *FINGER))
+    artist, spent = shared.artist(), {"move": [], "advance": []}
+    for name in spent:
+        original = getattr(artist, name)
+
+        def timed(*given: Any, _run: Any = original, _into: Any = spent[name]) -> None:
+            began = time.perf_counter()
+            _run(*given)
+            _into.append(1e3 * (time.perf_counter() - began))
+
+        setattr(artist, name, timed)
+    take_up(window, "transfer")
+    yield from window.drag(way(window, *BALL, BALL[0], BALL[1], BALL[0]))
+    yield 5
+    assert len(spent["move"]) > 15
+    for name, times in spent.items():
+        times.sort()
+        middle, most = times[len(times) // 2], times[int(0.95 * len(times))]
+        window.said.append(f"{name}: {len(times)} times, p50 {middle:.1f} ms, p95 {most:.1f} ms")
+    ours = [each for each in window.bpy.app.handlers.depsgraph_update_post if "contact" in str(each.__module__)]
+    assert not ours
+    built = artist.drawing.rebuilt
+    for _ in range(5):
+        window.draw()
+    assert artist.drawing.rebuilt == built, "batches are made anew though nothing has changed"

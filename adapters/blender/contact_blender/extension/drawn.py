@@ -20,6 +20,7 @@ from contact_core.interaction.overlay import NOTHING, Handle, Overlay, StrokeTin
 
 _LINE, _PAIR, _DOT = 2.0, 1.0, 5.0  # pixels of a plain screen
 _THROUGH = 0.18  # how strongly contacts show that something hides
+_GHOSTS = "LESS"  # their depth test, by which they are known: only their front is drawn, or it would show through
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 33)
 _RIM = (0.05, 0.05, 0.05, 0.9)
 Part = tuple[FloatArray, tuple[float, ...]]  # ends of segments, and their colour
@@ -62,10 +63,12 @@ class Drawing:
         try:
             for shader, batch, uniforms, depth in self._batches:
                 gpu.state.depth_test_set(depth)
+                gpu.state.face_culling_set("BACK" if depth == _GHOSTS else "NONE")
                 _draw(shader, batch, uniforms)
         finally:
             gpu.state.blend_set(before[0])
             gpu.state.depth_test_set(before[1])
+            gpu.state.face_culling_set("NONE")
 
     def draw_pixels(self) -> None:
         """Handles as discs, and names, where their places are seen."""
@@ -167,7 +170,7 @@ def _polylines(parts: Sequence[Part], width: float, depth: str) -> Batch:
 def _triangles(points: FloatArray, triangles: Any, color: tuple[float, ...]) -> Batch:
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     batch = batch_for_shader(shader, "TRIS", {"pos": _single(points)}, indices=np.asarray(triangles, np.int32))
-    return shader, batch, {"color": color}, "LESS_EQUAL"
+    return shader, batch, {"color": color}, _GHOSTS
 
 
 def _points(parts: list[FloatArray], colors: list[tuple[float, ...]]) -> Batch:

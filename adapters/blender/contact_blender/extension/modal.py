@@ -223,17 +223,17 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801
             cls.poll_message_set(reason)
         return not reason
 
+    _waits = False  # for the libraries, before the solver can begin
+
     def invoke(self, context: Any, event: Any) -> set[str]:
-        if not is_ready(self, context):
-            return {"CANCELLED"}
+        WARMING.begin()
         try:
             artist = shared.artist()
-            artist.do(self.action)
+            self._waits = not WARMING.is_done
+            if not self._waits:
+                artist.do(self.action)
         except Exception as error:
             return self._failed(context, error)
-        if artist.interaction.status.refusal:
-            refuse(self, context, artist.interaction.status.refusal)
-            return {"CANCELLED"}
         return self._start(context, artist)
 
     def modal(self, context: Any, event: Any) -> set[str]:
@@ -248,6 +248,8 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801
     def _event(self, context: Any, event: Any) -> set[str]:
         artist = shared.artist()
         hands = artist.interaction
+        if self._waits:
+            return self._wait(context, event, artist)
         if event.type == "TIMER":
             artist.advance()
             self._say(context, self._line(hands))
@@ -264,6 +266,19 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801
         if event.type in _NAVIGATION or event.type in _MOVES or not proposed:
             return {"PASS_THROUGH"}  # while it works, the window is the artist's
         return {"RUNNING_MODAL"}
+
+    def _wait(self, context: Any, event: Any, artist: Any) -> set[str]:
+        """Until everything is loaded and compiled; then the solver begins."""
+        if event.type == "ESC" and event.value == "PRESS":
+            return self._end(context, "CANCELLED")
+        if WARMING.failure:
+            refuse(self, context, WARMING.failure)
+            return self._end(context, "CANCELLED")
+        if WARMING.is_done:
+            self._waits = False
+            artist.do(self.action)
+        self._say(context, f"{_PREPARING} ({WARMING.doing}) · Esc cancels" if self._waits else artist.status())
+        return {"PASS_THROUGH"}
 
     def _after(self, context: Any, artist: Any) -> set[str]:
         """What a tick of the timer found."""

@@ -300,10 +300,19 @@ def recolor(session: Any, context: Any, given: Any) -> str:
     return f"{patch} has another colour."
 
 
+def _solve_beside(context: Any, given: Any) -> str:
+    """One pose is solved for beside the window; frames, which pose the scene one after the other, are not."""
+    if given.keyed:
+        return ""
+    context.window_manager.contact_tools.all.penetration = given.penetration
+    return "pose.solve"
+
+
 @operator(
     "solve",
     "Solve Pose",
     "pair",
+    beside=_solve_beside,
     penetration=BoolProperty(name="Penetration", description="Keep skin out of what is solid", default=False),
     keyed=BoolProperty(name="Key frames", description="Solve the frames and key them", default=False),
     first=IntProperty(name="First frame", default=1),
@@ -316,13 +325,19 @@ def solve(session: Any, context: Any, given: Any) -> str:
     return _accepted(session, session.solve(frames=frames, terms=terms, progress=session.host))
 
 
-@operator("settle", "Settle Contacts", "pair", rounds=IntProperty(name="Rounds", default=2, min=1, max=20))
+@operator(
+    "settle",
+    "Settle Contacts",
+    "pair",
+    beside=lambda context, given: "pose.settle",
+    rounds=IntProperty(name="Rounds", default=2, min=1, max=20),
+)
 def settle(session: Any, context: Any, given: Any) -> str:
     """Put every contact at the closest point that faces it on its object, and solve again."""
     return _accepted(session, session.settle(rounds=given.rounds, settings=_telling(session)))
 
 
-@operator("slide", "Slide Contacts", "pair")
+@operator("slide", "Slide Contacts", "pair", beside=lambda context, given: "pose.slide")
 def slide(session: Any, context: Any, given: Any) -> str:
     """Solve the pose with each contact free to slide a little over its object."""
     return _accepted(session, session.slide(settings=_telling(session)))
