@@ -53,6 +53,11 @@ DEFINITIONS = {
     "bones_through": "number of bones (joint to child joint) that cross the object's surface",
     "skin_stretch_p99": "99th percentile over skin edges of posed / rest length",
     "max_joint_change_deg": "largest rotation of a joint (roots left out) away from rest, degrees",
+    "opposition_deg": "median over the fingers of the angle from which each presses against thumb and palm",
+    "crossing": "how far bones of two digits are in one another, as a share of how near they may come",
+    "digits_through": "digits through a loop at the place that was to be held",
+    "skin_through": "how far a digit's skin is beyond a wall between it and its bone, a fraction of the length",
+    "closure": "Ferrari and Canny's measure of force closure; below 0 the contacts do not hold",
     "start_distance": "closest distance of the open hand to the object before the solve",
     "solids": "the object's surface where it is closed, and a filled proxy (hull) where the recipe asks",
 }
