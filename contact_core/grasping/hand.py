@@ -105,6 +105,13 @@ class Hand:
             for a, b in zip(self.bones[:-1], self.bones[1:], strict=True)
         )
 
+    @cached_property
+    def own_skin(self) -> IntArray:
+        """Vertices of palm and digits: held strongest by the joint at which the digits part, or one below it."""
+        rig = self.rig
+        owner = rig.skin_joints[np.arange(len(rig.skin_joints)), rig.skin_weights.argmax(axis=1)]
+        return np.flatnonzero(_below(rig, np.array([self.description.hub]))[owner])
+
     def angles_of(self, pose: Pose) -> FloatArray:
         """(B,) by how much each bone is bent about its axis in a pose of the rig."""
         order = [pose.joints.index(self.rig.joints[joint]) for joint in self.joints]

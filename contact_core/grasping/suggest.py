@@ -413,7 +413,7 @@ def finished(
 
 def _kept_out_of(scene: GraspScene, skin: FloatArray) -> DistanceField:
     """The object near the closed hand's skin (n, 3), its hollows filled where the hand does not reach into them."""
-    own = scene.near(skin[np.concatenate(scene.hand.skin_of_digits)])
+    own = scene.near(skin[scene.hand.own_skin])
     solid = scene.solid if own is scene.field else filled(own, FILLED * scene.hand.length)
     return solid if solid.distances(skin).min() > -OUTSIDE * scene.hand.length else own
 
