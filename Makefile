@@ -44,11 +44,12 @@ typecheck: $(READY)
 pytest: $(READY)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -q
 
-# 500 processes that edit and save killed at random, 20 workers of a batch; then the laws on examples that nobody drew
+# 500 processes that edit and save killed at random, 20 workers of a batch, 1000 damages of each stored format; then the laws on examples that nobody drew
 # before, ROUNDS times over.
 ROUNDS ?= 5
 explore: $(READY)
 	CONTACT_KILLS=500 CONTACT_BATCH_KILLS=20 $(BIN)/pytest -n 2 -q tests/core/edit/test_journal.py tests/core/farm -k kill
+	CONTACT_FLIPS=1000 $(BIN)/pytest -n 2 -q tests/core/test_sealed.py
 	for round in $$(seq $(ROUNDS)); do OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 \
 		$(BIN)/pytest -n 2 --dist loadfile -q -m hypothesis --hypothesis-profile explore || exit 1; done
 

@@ -10,8 +10,6 @@ import contextlib
 import os
 import sys
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,8 @@ import numpy.typing as npt
 
 from contact_core.atomic_file import replacing
 from contact_core.errors import FileRefused
+
+_NAMES = "names of all arrays"  # an archive guards the bytes of its entries, but not which ones there are
 
 
 def cache_directory() -> Path | None:
@@ -47,15 +47,17 @@ def cached_arrays(
     if path is not None and path.is_file():
         try:
             with np.load(path, allow_pickle=False) as archive:
-                return {name: archive[name] for name in archive.files}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
-            pass  # a damaged file is made again
+                kept = {name: archive[name] for name in archive.files}
+            if sorted(kept.pop(_NAMES).tolist()) == sorted(kept):
+                return kept
+        except Exception:  # whatever a damaged archive makes zipfile, zlib, numpy and its tokenizer say
+            pass
     arrays = make()
     if path is not None:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(path) as part:
-                np.savez_compressed(part, allow_pickle=False, **arrays)
+                np.savez_compressed(part, allow_pickle=False, **arrays, **{_NAMES: np.array(list(arrays))})
         except (OSError, FileRefused):
             pass
     return arrays

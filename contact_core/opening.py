@@ -15,7 +15,7 @@ from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.reading import read_asset
+from contact_core.plugins.reading import SAMPLE, read_asset, unread
 from contact_core.plugins.registry import FORMATS, HOSTS
 from contact_core.session import Session
 
@@ -33,7 +33,7 @@ def open(  # noqa: A001 - as `pathlib.Path.open`: within this package the word m
     discover: bool = True,
 ) -> Session:
     """A session on a document (.json), on a scene that a host opens (.usda, .contactscene, within Blender .blend),
-    or on the one asset in a file of a mesh or a rig (.glb, .urdf, .obj ...).
+    or on the one asset in a file of a mesh or a rig (.glb, .urdf, .obj ...) or in "sample:NAME".
 
     objects: of a scene, ids or names of those that become surfaces beside the ones that its document knows; all by
     default where it knows none. surfaces: object ids by surface, for those that cannot be told from their
@@ -49,14 +49,12 @@ def open(  # noqa: A001 - as `pathlib.Path.open`: within this package the word m
         if suffix in host.suffixes:
             return Session(host=host.open(path), objects=objects, surfaces=surfaces, plugins=manager)
     formats = [kind for kind in manager.offers(FORMATS).values() if kind.can_read]
-    if any(suffix in kind.suffixes for kind in formats):
+    if str(path).startswith(SAMPLE) or any(suffix in kind.suffixes for kind in formats):
         asset = read_asset(path, manager)
         return Session.of_assets({asset.name: asset}, plugins=manager)
     suffixes = [*(kind.suffixes for kind in hosts.values()), *(kind.suffixes for kind in formats)]
-    known = sorted({DOCUMENT_SUFFIX, *(s for several in suffixes for s in several)})
-    raise FileRefused(
-        f"nothing here opens {path.name}: {suffix or 'a name without suffix'} is none of {', '.join(known)}."
-    )
+    known = (DOCUMENT_SUFFIX, *(s for several in suffixes for s in several))
+    raise FileRefused(f"nothing here opens {path.name}: {unread(path, known)}")
 
 
 def new(*, plugins: PluginManager | Iterable[object] = (), discover: bool = True, **sources: Source) -> Session:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ from contact_core.document.document import ContactDocument, ContactPair, Patch, 
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.schema import MAX_BYTES, inconsistencies, open_envelope, parse_json
 from contact_core.errors import FileRefused
+from contact_core.sealed import sealed, unsealed
 
 SCHEMA = "contact-core.contact-set"
 VERSION = 1
@@ -51,14 +53,15 @@ class ContactSet:
 def save_contact_set(contact_set: ContactSet, path: Path | str) -> None:
     """Write a set atomically. Raises FileRefused."""
     data = {"schema": SCHEMA, "version": VERSION, **to_json(contact_set)}
-    write_atomic(path, pretty(data) + "\n")
+    write_atomic(path, pretty(sealed(json.loads(json.dumps(data)))) + "\n")
 
 
 def load_contact_set(path: Path | str) -> ContactSet:
     """Read a set. Raises FileRefused for what is none, is damaged, or is newer than this release."""
     path = Path(path)
     data = parse_json(read_bounded(path, MAX_BYTES), str(path))
-    body = open_envelope(data, SCHEMA, VERSION, UPGRADES, str(path))
+    open_envelope(data, SCHEMA, VERSION, UPGRADES, str(path))  # what it is comes before whether it is whole
+    body = open_envelope(unsealed(data, str(path)), SCHEMA, VERSION, UPGRADES, str(path))
     found: ContactSet = from_json(ContactSet, body, path.name)
     document = ContactDocument(found.surfaces, found.patches, found.shapes, found.pairs, found.groups)
     for problem in inconsistencies(document):

@@ -15,7 +15,7 @@ import os
 import socket
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -28,6 +28,7 @@ from contact_core.farm.inputs import Digests, as_read, first_change, noting_file
 from contact_core.plugins.registry import JOB_KINDS
 from contact_core.plugins.slots import JobOutcome, JobRequest
 from contact_core.progress import Progress
+from contact_core.sealed import DIGEST, sealed, unsealed
 
 if TYPE_CHECKING:
     from contact_core.plugins.manager import PluginManager
@@ -113,14 +114,23 @@ def earlier(task: Task, digests: Digests) -> Result | None:
 def read_receipt(folder: Path) -> Mapping[str, Any] | None:
     """The receipt in a folder; None where there is none, or a damaged one: then the job is done again."""
     try:
-        receipt = json.loads(read_bounded(folder / RECEIPT, MAX_BYTES))
-        well = receipt["schema"] == SCHEMA and receipt["version"] == VERSION and isinstance(receipt["key"], str)
+        written = json.loads(read_bounded(folder / RECEIPT, MAX_BYTES))
+        receipt = unsealed(written, RECEIPT)
+        well = isinstance(written[DIGEST], str) and isinstance(receipt["key"], str)
+        well = well and receipt["schema"] == SCHEMA and receipt["version"] == VERSION
         for known in receipt["inputs"]:
             well = well and isinstance(known["file"], str) and {"sha256", "size", "changed"} <= known.keys()
         result_of(receipt["result"])
     except (FileRefused, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
     return receipt if well else None
+
+
+def sealed_receipt(key: str, kind: str, inputs: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> str:
+    """The text of a receipt."""
+    receipt = {"schema": SCHEMA, "version": VERSION, "key": key, "kind": kind, "contact_core": __version__,
+               "inputs": inputs, "result": result}  # fmt: skip
+    return json.dumps(sealed(json.loads(json.dumps(receipt, allow_nan=False))), indent=1) + "\n"
 
 
 def result_of(data: Mapping[str, Any]) -> Result:
@@ -157,9 +167,7 @@ def perform(task: Task) -> Result:
             task.name, "done", badness=outcome.badness, failures=outcome.failures, rows=outcome.rows,
             notes=outcome.notes, files=outcome.files, thumbnail=thumbnail, seconds=took, cpu=cpu, worker=where,
         )  # fmt: skip
-        receipt = {"schema": SCHEMA, "version": VERSION, "key": task.key, "kind": task.kind,
-                   "contact_core": __version__, "inputs": inputs, "result": asdict(result)}  # fmt: skip
-        write_atomic(Path(task.folder) / RECEIPT, json.dumps(receipt, indent=1, allow_nan=False) + "\n")
+        write_atomic(Path(task.folder) / RECEIPT, sealed_receipt(task.key, task.kind, inputs, asdict(result)))
     except Cancelled as error:
         return failed(too_long(task.limit) if task.limit is not None and limit.is_over else str(error))
     except ContactError as error:

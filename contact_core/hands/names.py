@@ -2,7 +2,8 @@
 
 Read are the conventions of Mixamo, Rigify, VRM, Unreal, Daz ("lMid1"), Reallusion, 3ds Max Biped and Valve
 ("Finger0" to "Finger42"), MakeHuman ("finger2-1.L"), MMD (in Japanese and in English), SMPL-X, WebXR, OpenXR and
-ARKit ("MidStart"). Geometry comes first (contact_core.hands.describe); names confirm it and give the roles.
+ARKit ("MidStart"), and the fingers' names in German, French, Spanish and Italian. Geometry comes first
+(contact_core.hands.describe); names confirm it and give the roles.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ ROLES = ("thumb", "index", "middle", "ring", "little")
 DIGITS = {
     "thumb": "thumb", "index": "index", "pointer": "index", "forefinger": "index", "middle": "middle",
     "ring": "ring", "little": "little", "pinky": "little", "pinkie": "little",
+    "daumen": "thumb", "zeige": "index", "mittel": "middle", "klein": "little",
+    "pouce": "thumb", "majeur": "middle", "annulaire": "ring", "auriculaire": "little",
+    "pulgar": "thumb", "indice": "index", "corazon": "middle", "anular": "ring", "menique": "little",
+    "pollice": "thumb", "mignolo": "little",
 }  # fmt: skip
 WHOLE_WORDS = {"mid": "middle", "fore": "index", "third": "ring", "idx": "index", "pink": "little"}
 JAPANESE = {
@@ -112,6 +117,9 @@ def digit_joints(names: Sequence[str]) -> list[DigitJoint | None]:
     found = [digit_joint(name) for name in names]
     counted = {k: c[0] for k, name in enumerate(names) if found[k] and (c := _counted_finger(words_of(name)))}
     counted = {k: c for k, c in counted.items() if _named_digit(words_of(names[k])) is None}
+    named = {joint.digit for k, joint in enumerate(found) if joint and k not in counted}
+    if len(named - {"thumb"}) > 1:  # fingers have names here, so a number beside "finger" counts segments
+        return [None if k in counted else joint for k, joint in enumerate(found)]
     thumb_named = any(joint and joint.digit == "thumb" and k not in counted for k, joint in enumerate(found))
     if counted and 0 not in counted.values() and not thumb_named and max(counted.values()) in (5, 4, 3):
         for k, count in counted.items():

@@ -18,6 +18,7 @@ from contact_core.geometry.transform import is_rigid
 from contact_core.grasping.slots import Kind
 from contact_core.hands.description import Segment
 from contact_core.rig.rig import Pose
+from contact_core.sealed import sealed, unsealed
 
 SCHEMA = "contact-core.grasp"
 VERSION = 1
@@ -168,16 +169,17 @@ class Grasp:
 
 def dump_grasp(grasp: Grasp) -> str:
     """JSON text, sorted, the same for the same grasp."""
-    return pretty({"schema": SCHEMA, "version": VERSION, **to_json(grasp, Grasp)}) + "\n"
+    return pretty(sealed({"schema": SCHEMA, "version": VERSION, **to_json(grasp, Grasp)})) + "\n"
 
 
 def parse_grasp(text: bytes, source: str) -> Grasp:
     """The grasp in JSON. Raises FileRefused for what is none, is damaged, or is newer than this release."""
     if len(text) > MAX_BYTES:
         raise FileRefused(f"{source} has {len(text)} bytes; a grasp has at most {MAX_BYTES}.")
-    found: Grasp = from_json(
-        Grasp, open_envelope(parse_json(text, source), SCHEMA, VERSION, UPGRADES, source), source
-    )
+    data = parse_json(text, source)
+    open_envelope(data, SCHEMA, VERSION, UPGRADES, source)  # what it is comes before whether it is whole
+    body = open_envelope(unsealed(data, source), SCHEMA, VERSION, UPGRADES, source)
+    found: Grasp = from_json(Grasp, body, source)
     return found
 
 

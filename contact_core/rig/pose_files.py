@@ -12,6 +12,7 @@ import numpy as np
 from contact_core.atomic_file import write_atomic
 from contact_core.errors import FileRefused
 from contact_core.rig.rig import Pose
+from contact_core.sealed import sealed, unsealed
 
 SCHEMA = 1
 LARGEST_FILE = 64_000_000  # bytes
@@ -19,7 +20,7 @@ LARGEST_FILE = 64_000_000  # bytes
 
 def save_pose(path: Path | str, pose: Pose, *, rig: str = "") -> None:
     """Write a pose as JSON, atomically. Raises FileRefused."""
-    write_atomic(path, json.dumps({"kind": "contact.pose", "schema": SCHEMA, "rig": rig, **_plain(pose)}))
+    write_atomic(path, json.dumps(sealed({"kind": "contact.pose", "schema": SCHEMA, "rig": rig, **_plain(pose)})))
 
 
 def load_pose(path: Path | str) -> Pose:
@@ -53,4 +54,4 @@ def _read(path: Path | str, kind: str) -> dict[str, Any]:
         raise FileRefused(f"{path.name} is not a file of the kind {kind}.")
     if data.get("schema") != SCHEMA:
         raise FileRefused(f"{path.name} has schema {data.get('schema')!r}; this version reads {SCHEMA}.")
-    return data
+    return unsealed(data, path.name)

@@ -41,16 +41,23 @@ class UsdFiles:
         try:
             if len(rigs) == 1:
                 rig = host.read_rig(rigs[0])
-                return replace(rig, notes=(*rig.notes, *host.losses()))
+                beside = [item.id for item in items if item.kind != "rig"]
+                told = [f"meshes beside the rig, which are not part of it: {named(beside)}."] if beside else []
+                return replace(rig, notes=(*rig.notes, *told, *host.losses()))
             if rigs or not items:
                 found = f"{len(rigs)} rigs ({', '.join(rigs[:6])})" if rigs else "no meshes"
                 found += "".join(f" ({note.rstrip('.')})" for note in host.losses()[:2])
                 raise FileRefused(
                     f"{path} has {found}; as a file it is read where it has one rig, or meshes alone."
                 )
+            from contact_usd.mesh import is_empty
             from contact_usd.primitives import drawn
 
             kept, left = drawn({item.id: host.stage.GetPrimAtPath(item.id) for item in items})
+            empty = [key for key in kept if is_empty(host.stage.GetPrimAtPath(key))]
+            if empty:
+                left.append(f"meshes without points or faces, left out: {named(empty)}.")
+                kept = [key for key in kept if key not in set(empty)]
             if not kept:
                 raise FileRefused(f"{path} draws nothing: {' '.join(left)}")
             asset = _one_mesh(host, path, kept)
@@ -69,6 +76,11 @@ class UsdFiles:
             if asset.rig is not None and asset.name in poses:
                 host.write_pose(key, poses[asset.name])
         host.save(Path(path))
+
+
+def named(paths: Sequence[str]) -> str:
+    """The first paths of a list for a sentence, and how many there are besides."""
+    return ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
 
 
 def _host(path: Path | None, meters_per_unit: float = 1.0, up_axis: str = "Y") -> UsdHost:

@@ -79,6 +79,14 @@ def array_of(attribute: Usd.Attribute, shape: tuple[int, ...], dtype: type) -> A
         raise InvalidInput(f"{attribute.GetPath()} holds a {got}, where a {expected} is expected.") from error
 
 
+def is_empty(prim: Usd.Prim) -> bool:
+    """Whether a prim is a mesh that draws nothing, because it has no points or no faces."""
+    if is_primitive(prim):
+        return False
+    mesh = UsdGeom.Mesh(prim)
+    return not (mesh.GetPointsAttr().Get(AS_IT_STANDS) and mesh.GetFaceVertexCountsAttr().Get(AS_IT_STANDS))
+
+
 def read_arrays(prim: Usd.Prim) -> MeshArrays:
     """The arrays of a UsdGeomMesh. Raises InvalidInput naming the prim when they do not fit together."""
     if is_primitive(prim):

@@ -12,7 +12,7 @@ class Inspect:
     summary = "tell what is in a mesh or rig file"
 
     def configure(self, parser: argparse.ArgumentParser) -> None:
-        parser.add_argument("file", type=Path, metavar="FILE")
+        parser.add_argument("file", type=Path, metavar="FILE", help="a mesh or rig, or sample:NAME")
         parser.add_argument("--sidecar", type=Path, metavar="RIG.toml", help="joint limits and hinges for the rig")
         parser.add_argument(
             "--picture", type=Path, metavar="FILE.png", help="draw the description of its hand there"

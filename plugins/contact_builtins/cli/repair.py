@@ -17,7 +17,7 @@ class Repair:
     summary = "make the closed manifold that stands for a broken mesh, its proxy"
 
     def configure(self, parser: argparse.ArgumentParser) -> None:
-        parser.add_argument("file", type=Path, metavar="FILE")
+        parser.add_argument("file", type=Path, metavar="FILE", help="a mesh or rig, or sample:NAME")
         parser.add_argument("--out", type=Path, metavar="OUT.glb", help="write it there, with the skeleton of FILE")
         parser.add_argument("--picture", type=Path, metavar="OUT.png", help="draw it beside FILE there")
         parser.add_argument("--maker", help="the proxy maker; by default the one for repairs")

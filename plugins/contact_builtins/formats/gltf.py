@@ -14,7 +14,7 @@ from contact_builtins.formats.gltf_rig import rig_asset
 from contact_builtins.formats.gltf_scene import Part, read_parts
 from contact_builtins.formats.gltf_skeleton import read_skeleton
 from contact_builtins.formats.polygons import Polygons, surface_of
-from contact_builtins.formats.refusal import refusing
+from contact_builtins.formats.refusal import NoSurface, refusing
 from contact_builtins.formats.sidecar import read_sidecar, sidecar_beside
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput
@@ -41,7 +41,7 @@ class GltfFiles:
             nodes = read_nodes(gltf)
             parts, notes = read_parts(gltf, nodes)
             if not parts:
-                raise InvalidInput("its scene holds no triangles")
+                raise NoSurface("holds no triangles in the scene that it shows; name a file with a mesh.")
             if any(part.skin is not None for part in parts):
                 return rig_asset(gltf, nodes, parts, read_sidecar(told) if told else None, notes)
             if sidecar is not None:

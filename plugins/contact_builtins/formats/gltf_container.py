@@ -39,7 +39,8 @@ HARMLESS = (
     "CESIUM_primitive_outline", "AGI_", "ASOBO_", "BLENDER_", "FB_ngon_encoding", "GODOT_", "MOZ_", "NEEDLE_",
     "MX_", "OMI_", "VRM",
 )  # fmt: skip
-UNDERSTOOD = ("KHR_mesh_quantization", "KHR_draco_mesh_compression", *gltf_meshopt.NAMES)
+INSTANCING = "EXT_mesh_gpu_instancing"
+UNDERSTOOD = (INSTANCING, "KHR_mesh_quantization", "KHR_draco_mesh_compression", *gltf_meshopt.NAMES)
 _OLD = (
     "{path} is glTF version {version}, an old format that is laid out otherwise; version 2 is read. Convert it"
     " (gltf-pipeline does) or export it anew as glTF 2.0."

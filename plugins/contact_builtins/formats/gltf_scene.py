@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
-from contact_builtins.formats.gltf_container import COMPRESSED, Gltf
+from contact_builtins.formats.gltf_container import COMPRESSED, INSTANCING, Gltf
 from contact_builtins.formats.gltf_draco import without_draco
 from contact_builtins.formats.gltf_nodes import Nodes, is_hull
-from contact_builtins.formats.refusal import bounded, named
+from contact_builtins.formats.refusal import NoSurface, bounded, named
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.transform import transform_points
@@ -75,7 +76,7 @@ def read_parts(gltf: Gltf, nodes: Nodes) -> tuple[list[Part], list[str]]:
         told = named([nodes.names[index] for index in hulls])
         reading.notes[f"Collision hulls, which are never drawn, were left out: {told}."] = None
     if not parts and hidden:
-        raise InvalidInput(f"its scene shows no triangles; hidden are {named(hidden)}")
+        raise NoSurface(f"shows no triangles: hidden are {named(hidden)}. Make one of them visible.")
     return parts, list(reading.notes)
 
 
@@ -103,18 +104,42 @@ def _node_parts(gltf: Gltf, nodes: Nodes, node: int, reading: _Reading) -> list[
         found = reading.known[key]
         size = len(found.points) + len(found.faces)
         reading.total = bounded(reading.total + size, "vertices and faces in all")
+        what = "vertices and faces in copies of its meshes"
         if not new:
-            what = "vertices and faces in copies of its meshes"
             reading.copied = bounded(reading.copied + size, what, MAX_COPIED)
-        parts.append(_placed(nodes, node, entry.get("skin"), found))
+        if found.joints is not None:  # a skin's primitive stays in the space in which it was bound
+            parts.append(Part(node, entry["skin"], found.points, found.faces, found.joints, found.weights))
+            continue
+        copies = _copies(gltf, entry, reading)
+        reading.copied = bounded(reading.copied + size * (len(copies) - 1), what, MAX_COPIED)
+        parts += [_placed(nodes.world[node] @ local, node, found) for local in copies]
     return parts
 
 
-def _placed(nodes: Nodes, node: int, skin: Any, found: _Primitive) -> Part:
-    """A primitive where its node puts it; a skin's stays in the space in which it was bound."""
-    if found.joints is not None:
-        return Part(node, skin, found.points, found.faces, found.joints, found.weights)
-    world, faces = nodes.world[node], found.faces
+def _copies(gltf: Gltf, entry: dict[str, Any], reading: _Reading) -> FloatArray:
+    """(k, 4, 4) where a node's mesh is drawn, in the node's space: once, or as EXT_mesh_gpu_instancing says."""
+    said = (entry.get("extensions") or {}).get(INSTANCING)
+    if not said:
+        return np.eye(4)[None]
+    columns = {key: gltf.accessor(index).astype(np.float64) for key, index in said.get("attributes", {}).items()}
+    usual = {"TRANSLATION": np.zeros(3), "ROTATION": np.array([0.0, 0.0, 0.0, 1.0]), "SCALE": np.ones(3)}
+    counts = {len(columns[key]) for key in usual if key in columns}
+    if len(counts) != 1:
+        raise InvalidInput(f"the instances of a mesh have {sorted(counts) or 'no'} places")
+    count = bounded(counts.pop(), "copies of a mesh", MAX_COPIES)
+    moves, turns, scales = (
+        columns.get(key, np.broadcast_to(value, (count, len(value)))) for key, value in usual.items()
+    )
+    copies = np.tile(np.eye(4), (count, 1, 1))
+    copies[:, :3, :3] = Rotation.from_quat(turns).as_matrix() * scales[:, None, :]
+    copies[:, :3, 3] = moves
+    reading.notes["Copies of a mesh (EXT_mesh_gpu_instancing) are part of the surface."] = None
+    return copies
+
+
+def _placed(world: FloatArray, node: int, found: _Primitive) -> Part:
+    """A primitive where its node, or one of its copies, puts it."""
+    faces = found.faces
     if np.linalg.det(world[:3, :3]) < 0:  # a mirrored node turns its faces round (glTF 2.0, 3.7.4)
         faces = faces[:, ::-1]
     return Part(node, None, transform_points(world, found.points), faces, None, None)

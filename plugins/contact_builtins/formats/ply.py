@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contact_builtins.formats.polygons import Polygons
-from contact_builtins.formats.refusal import bounded
+from contact_builtins.formats.refusal import NoSurface, bounded
 from contact_builtins.formats.words import as_whole, numbers, plain, whole
 from contact_core.arrays import IntArray
 from contact_core.errors import InvalidInput
@@ -84,7 +84,9 @@ def _faces(tables: dict[str, Table]) -> tuple[IntArray, IntArray]:
             return as_whole(face[name][0], "the sizes of faces"), as_whole(face[name][1], "corners of faces")
         if name in strips:
             return _of_strips(as_whole(strips[name][1], "corners of strips"))
-    raise InvalidInput("it has no faces, only points")
+    raise NoSurface(
+        "holds points and no faces (a scan or splats): make a surface of them first, in MeshLab or CloudCompare."
+    )
 
 
 def _of_strips(corners: IntArray) -> tuple[IntArray, IntArray]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contact_builtins.formats.refusal import NO_FACES, NoSurface
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.sound import sound_polygons
@@ -57,7 +58,7 @@ def surface_of(polygons: Polygons, weld_groups: IntArray | None = None) -> Surfa
     sound = sound_polygons(points[used], polygons.sizes, corners.reshape(-1), apart=apart)
     triangles, cut, notes = triangulate(sound.sizes, sound.indices, points[used[sound.first]])
     if not len(triangles):
-        raise InvalidInput("it holds no faces")
+        raise NoSurface(NO_FACES)
     kept = np.unique(triangles)
     renumber = np.full(len(sound.first) + 1, -1)
     renumber[kept] = np.arange(len(kept))

@@ -11,6 +11,7 @@ from pathlib import Path
 from contact_core.errors import FileRefused, InvalidInput
 
 _TOLD = 8  # names in a sentence
+NO_FACES = "holds no faces, so there is nothing to touch; name a file with a mesh."
 MAX_FILE_BYTES = 1 << 30
 MAX_JOINTS = 4096
 MAX_ELEMENTS = 20_000_000  # vertices, faces, accessor rows: far above any mesh that a person paints on
@@ -40,6 +41,10 @@ _WORDS: dict[type[Exception], str] = {
 }
 
 
+class NoSurface(InvalidInput):
+    """A sound file that holds nothing to touch. The message goes on after "FILE "."""
+
+
 @contextmanager
 def refusing(path: Path, what: str) -> Iterator[None]:
     """Everything that a damaged `what` ("an OBJ file") can cause, as FileRefused naming the file."""
@@ -49,6 +54,8 @@ def refusing(path: Path, what: str) -> Iterator[None]:
         raise
     except OSError as error:
         raise FileRefused(f"{path} cannot be read: {error.strerror or error}.") from error
+    except NoSurface as error:
+        raise FileRefused(f"{path} {error}") from error
     except DAMAGE as error:
         reason = _in_words(error)
         raise FileRefused(f"{path} was to be {what}, but is damaged: {reason[:300]}. Export it anew.") from error

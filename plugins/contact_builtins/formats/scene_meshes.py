@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from contact_builtins.formats.polygons import Polygons, surface_of
-from contact_builtins.formats.refusal import MAX_FILE_BYTES, bounded, file_bytes, refusing
+from contact_builtins.formats.refusal import MAX_FILE_BYTES, NO_FACES, NoSurface, bounded, file_bytes, refusing
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
@@ -49,7 +49,7 @@ class SceneMeshFiles:
         with refusing(path, "a COLLADA file" if suffix == ".dae" else "a 3MF file"):
             parts, unit, up, notes = PARSERS[suffix](file_bytes(path))
             if not parts:
-                raise InvalidInput("it holds no faces")
+                raise NoSurface(NO_FACES)
             starts = np.cumsum([0, *(len(points) for points, _, _ in parts)])
             polygons = Polygons(
                 np.concatenate([points for points, _, _ in parts]),

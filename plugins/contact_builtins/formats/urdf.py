@@ -12,7 +12,7 @@ import numpy as np
 
 from contact_builtins.formats.any_mesh import read_any_mesh
 from contact_builtins.formats.polygons import Polygons, surface_of
-from contact_builtins.formats.refusal import MAX_JOINTS, bounded, named, refusing
+from contact_builtins.formats.refusal import MAX_JOINTS, NoSurface, bounded, named, refusing
 from contact_builtins.formats.sidecar import read_sidecar, sidecar_beside
 from contact_builtins.formats.urdf_paths import MeshPaths
 from contact_builtins.formats.urdf_xml import Joint, Link, Mimic, Visual, parse_urdf, turn
@@ -179,7 +179,9 @@ def _skin(
             owners.append(np.full(len(solid[0]), joint))
             total += len(solid[0])
     if not points:
-        raise InvalidInput("none of its links has a visual mesh, so there is no surface to touch with")
+        raise NoSurface(
+            "gives none of its links a <visual> with a shape, so there is nothing to touch with; add some."
+        )
     return np.concatenate(points), np.concatenate(faces), np.concatenate(owners), list(notes)
 
 

@@ -353,3 +353,24 @@ def test_inspect_prints_a_hand_and_draws_it(tmp_path: Path, capsys: pytest.Captu
     text = capsys.readouterr().out
     assert "right hand at wrist" in text and "thumb: thumb_metacarpal" in text and "6 pads" in text
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    "fingers",
+    [
+        ("Daumen", "Zeigefinger", "Mittelfinger", "Ringfinger", "KleinerFinger"),
+        ("pouce", "index", "majeur", "annulaire", "auriculaire"),
+        ("Pulgar", "Indice", "Corazon", "Anular", "Menique"),
+        ("Pollice", "Indice", "Medio", "Anulare", "Mignolo"),
+    ],
+)
+def test_fingers_have_names_in_other_languages(fingers: tuple[str, ...]) -> None:
+    """And the number beside a "KleinerFinger" counts its segments, not the fingers."""
+    asset = HUMAN_HAND.build()
+    assert asset.rig is not None
+    names, plain = list(asset.rig.joints), describe_hand(asset.rig)
+    for word, digit in zip(fingers, plain.digits, strict=True):
+        for number, joint in enumerate(digit.joints):
+            names[joint] = f"{word}{number}.L"
+    told = describe_hand(replace(asset.rig, joints=tuple(names)))
+    assert [(d.role, d.joints) for d in told.digits] == [(d.role, d.joints) for d in plain.digits]
