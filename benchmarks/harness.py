@@ -35,14 +35,17 @@ class Times:
 
 
 def interleaved(contestants: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, Times]:
-    """Call every contestant once per round, in turn, after one call of each that does not count."""
+    """Call every contestant once per round, after one call of each that does not count. Each round begins with
+    another: whoever comes after one that fills the caches pays for it."""
     seconds: dict[str, list[float]] = {name: [] for name in contestants}
     for call in contestants.values():
         call()
-    for _ in range(rounds):
-        for name, call in contestants.items():
+    names = list(contestants)
+    for turn in range(rounds):
+        first = turn % len(names)
+        for name in names[first:] + names[:first]:
             began = time.process_time()
-            call()
+            contestants[name]()
             seconds[name].append(time.process_time() - began)
     return {name: Times(tuple(times)) for name, times in seconds.items()}
 
