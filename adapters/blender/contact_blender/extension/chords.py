@@ -23,7 +23,6 @@ _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT
 INSTEAD: Mapping[str, tuple[str, ...]] = {
     "tool.select": ("Shift+Q",),
     "tool.transfer": ("Shift+T",),
-    "tool.place": ("Shift+N",),
     "selection.surface": ("Y",),
     "pose.solve": ("Ctrl+Enter",),
     "pose.settle": ("Shift+Enter",),
@@ -32,8 +31,10 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "pose.rest": ("Alt+R",),
     "pose.key": ("I",),
 }
-# Blender does these, beside what the table leaves to the front end: undo, shading, local view, playback.
-_BLENDERS = frozenset(("edit.undo", "edit.redo", "show.xray", "show.isolate", "film.play", "film.first"))
+# Blender does these, beside what the table leaves to the front end.
+_BLENDERS = frozenset(
+    ("edit.undo", "edit.redo", "show.xray", "show.isolate", "film.play", "film.first", "tool.place")
+)
 _OURS = frozenset(("pose.key",))  # left to the front end by the table, and done by us
 WHILE_PROPOSED = frozenset(("edit.cancel", "edit.accept", "pose.another", "pose.before"))  # keys of that operator
 

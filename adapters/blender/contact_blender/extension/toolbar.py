@@ -23,7 +23,7 @@ GROUPS = (
     ("paint", "erase", "lasso", "curve"),
     ("transfer", "pair", "link"),
     ("move", "turn", "bend", "scale", "axis", "weigh"),
-    ("joint", "place"),
+    ("joint",),
     ("measure",),
 )
 ICONS = {
@@ -32,7 +32,7 @@ ICONS = {
     "pair": "ops.curve.extrude_move", "link": "ops.armature.extrude_move", "move": "ops.transform.translate",
     "turn": "ops.transform.rotate", "bend": "ops.gpencil.edit_bend", "scale": "ops.transform.resize",
     "axis": "ops.gpencil.draw.line", "weigh": "ops.gpencil.radius", "joint": "ops.pose.push",
-    "place": "ops.transform.transform", "measure": "ops.view3d.ruler",
+    "measure": "ops.view3d.ruler",
 }  # fmt: skip
 OF_ITS_OWN = ("pose.solve", "pose.settle", "pose.slide", "pose.suggest")  # what runs beside the window
 PIE = (
@@ -150,7 +150,8 @@ def _take_up(operator: Any, context: Any, name: str) -> set[str]:
 
 def _tools(mode: str) -> list[tuple[Any, dict[str, Any]]]:
     """The classes of the tools of a mode, each with how it is registered."""
-    told = {tool["name"]: tool for tool in settings.tools()}
+    mine = {action["id"] for action in _actions()}
+    told = {tool["name"]: tool for tool in settings.tools() if f"tool.{tool['name']}" in mine}
     grouped = {name for group in GROUPS for name in group}
     groups = [tuple(n for n in group if n in told) for group in GROUPS]
     groups += [(name,) for name in told if name not in grouped]
