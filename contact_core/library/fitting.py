@@ -21,6 +21,8 @@ STIFF = 0.35  # how much a joint that is straight takes part in curling, of one 
 LOOKS = np.radians([-24.0, -12.0, 0.0, 12.0, 24.0])  # of the thumb's first joint, about two axes
 LOOK_PRICE = 0.03  # hand lengths, for a turn by 24 degrees
 OPPOSE = 0.03  # hand lengths that it is worth that the thumb presses against the other digits
+TORN, TORN_PRICE = 1.35, 0.3  # skin that is stretched so much spoils a grasp: what more costs
+MISSED = 0.1  # hand lengths: a digit that takes part and touches nothing
 FAR = 0.06  # hand lengths: pads farther away are not on the object
 PALM_REACH = 0.08  # hand lengths that a palm may back out or come nearer
 
@@ -90,7 +92,8 @@ def _looks(hand: Hand, digit: int, local: FloatArray) -> list[tuple[FloatArray, 
     now = nearest_rotations(local[bone.joint, None, :3, :3])[0]
     from_rest = nearest_rotations(hand.rig.rest_local[bone.joint, None, :3, :3])[0].T @ now
     stretch = stretches(hand.rig, bone.joint, from_rest @ np.array(turns))
-    costs = [c + STRETCH_PRICE * max(s - STRETCHED, 0.0) for c, s in zip(costs, stretch, strict=True)]
+    far = STRETCH_PRICE * np.maximum(stretch - STRETCHED, 0.0) + TORN_PRICE * np.maximum(stretch - TORN, 0.0)
+    costs = [cost + float(more) for cost, more in zip(costs, far, strict=True)]
     return list(zip(turns, costs, strict=True))
 
 
@@ -123,7 +126,8 @@ def _curled(
     if against is not None and normal is not None:
         off += OPPOSE * 0.5 * float(1.0 + normal @ against)
     sunk = max(-float(clear[s]) / hand.length - TOUCH, 0.0)
-    return off + 2.0 * sunk + price, turn, angles[s], normal
+    missed = MISSED if touches and clear[s] > 2.0 * TOUCH * hand.length else 0.0
+    return off + 2.0 * sunk + missed + price, turn, angles[s], normal
 
 
 def _where(clear: FloatArray, touch: float, touches: bool) -> int:
