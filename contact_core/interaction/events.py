@@ -23,7 +23,22 @@ BUTTONS: tuple[Button, ...] = ("left", "middle", "right", "none")
 MODIFIERS: tuple[Modifier, ...] = ("ctrl", "alt", "shift")  # in the order in which a chord is spelt
 NO_MODIFIERS: frozenset[Modifier] = frozenset()
 KEY_NAMES = frozenset(
-    ("Escape", "Enter", "Space", "Tab", "Backspace", "Delete", "Home", "End", "Left", "Right", "Up", "Down")
+    (
+        "Escape",
+        "Enter",
+        "Space",
+        "Tab",
+        "Backspace",
+        "Delete",
+        "Home",
+        "End",
+        "Left",
+        "Right",
+        "Up",
+        "Down",
+        "F1",
+        "F2",
+    )
 )
 _SPELT = {"ctrl": "Ctrl", "alt": "Alt", "shift": "Shift"}
 

@@ -52,7 +52,9 @@ class Mark:
         ends = [np.asarray(rig.rest_world[rig.joint_index(name), :3, 3]) for name in self.joints]
         ends[0] = ends[0] + self.start * (ends[1] - ends[0])
         path = [*ends[:-1], *(ends[-2] + share * (ends[-1] - ends[-2]) for share in (0.1, 0.5, 0.9))]
-        return np.array(path) + np.array([self.aside, 0.0, 0.0])
+        shares = np.arange(0.0, len(path) - 1 + 1e-9, 0.25)  # close enough for a line that stays on the skin
+        axes = [np.interp(shares, np.arange(len(path)), coordinate) for coordinate in np.array(path).T]
+        return np.stack(axes, axis=1) + np.array([self.aside, 0.0, 0.0])
 
 
 def _round(angle: float) -> FloatArray:
@@ -65,7 +67,7 @@ def _finger(name: str) -> Mark:
 
 def _across(angle: float, height: float, by: float) -> Mark:
     """Over the mug's wall, level."""
-    return Mark(wall=tuple((angle + share * by, height) for share in (0.0, 0.25, 0.5, 0.75, 1.0)))
+    return Mark(wall=tuple((angle + share * by, height) for share in np.linspace(0.0, 1.0, 13)))
 
 
 def along_wall(place: FloatArray, by: float) -> Mark:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from contact_core.document.document import named
-from contact_core.errors import ContactError, FileRefused, InvalidInput
+from contact_core.errors import ContactError, InvalidInput
 from contact_core.interaction.actions import Action, action_of
 from contact_core.interaction.events import Event, Pointer
 from contact_core.interaction.interaction import Interaction
@@ -22,15 +22,17 @@ from contact_core.session import Session
 from contact_viewer import files, panel
 from contact_viewer.canvas import Canvas
 from contact_viewer.drawer import Drawer
+from contact_viewer.guide import Guide
 from contact_viewer.host import ViewerHost
-from contact_viewer.look import THEMES, from_hex
+from contact_viewer.look import THEMES
 from contact_viewer.navigation import Navigation
-from contact_viewer.recovery import Recovery
+from contact_viewer.recovery import Recovery, state_directory
+from contact_viewer.tree import TreeActions
 
 _SIDES = {"view.front": "front", "view.side": "right", "view.top": "top"}
 
 
-class Application:
+class Application(TreeActions):
     """What an artist has before them.
 
     sources: as for `files.open_files`. notes: sentences on what opening found, and what the last action did.
@@ -56,10 +58,13 @@ class Application:
         self._navigation = Navigation(canvas.eye)
         self._camera_moved = True
         self._told = False
+        self.guide = Guide(state_folder or state_directory())
         self._filmed = False
         self.film_open = False  # whether a timeline is shown, for which the film is measured
         self._meets: list[panel.Residual] = []
         self.open(list(sources))
+        if not sources and self.guide.is_new and not self.session.document.patches:
+            self.turn_tutorial()
 
     # -- what is edited ------------------------------------------------------------------------------------------
 
@@ -88,6 +93,7 @@ class Application:
             session = files.open_files(sources, self.plugins)  # what was kept belongs to other meshes
             found = None
         self._let_go()
+        self.guide.lesson, self._starts = None, tuple(sources or files.START) == files.START
         self._recovery = recovery
         self._take(session)
         self._path = Path(sources[0]) if len(sources) == 1 and Path(sources[0]).is_file() else None
@@ -111,7 +117,7 @@ class Application:
         self._session = session
         self._interaction = Interaction(session, meters_per_unit=meters)
         self._recovery.follow(session)
-        self.drawer = Drawer(self._interaction, self.canvas)
+        self.drawer = Drawer(self._interaction, self.canvas, self.guide.overlay)
         self.canvas.keep_surfaces(())
         self.see_all()
         self._interaction.prepare()
@@ -159,6 +165,9 @@ class Application:
     def _own(self, action: str) -> None:
         own: dict[str, Callable[[], object]] = {
             "show.help": self._turn_page,
+            "show.tutorial": self.turn_tutorial,
+            "show.card": lambda: self.turn_card("next"),
+            "show.card_before": lambda: self.turn_card("back"),
             "file.open": lambda: self._ask("open"),
             "file.export": lambda: self._ask("export"),
             "file.save": self.save,
@@ -180,6 +189,25 @@ class Application:
 
     def _turn_page(self) -> None:
         self.help_wanted, self._told = not self.help_wanted, True
+
+    def turn_tutorial(self) -> None:
+        """Begin the tutorial on the built-in hand and mug, or end it. What was open and not saved comes back when
+        it is opened again."""
+        if self.guide.lesson is not None:
+            self.guide.end()
+        else:
+            if not self._starts:
+                self.open([])
+            self.guide.begin(self.interaction)
+        self._redraw()
+
+    def turn_card(self, which: str) -> None:
+        """Go on in the tutorial ("next"), go "back", or "end" it."""
+        self.guide.turn(which)
+        self._redraw()
+
+    def _redraw(self) -> None:
+        self.drawer.stale = self._told = True
 
     def _ask(self, what: str) -> None:
         self.wants, self._told = what, True
@@ -205,21 +233,11 @@ class Application:
         """Save where it came from, or at a path. Raises FileRefused."""
         target = None if path is None else Path(path)
         if target is None and isinstance(self.session.host, ViewerHost) and self.session.host.path is None:
-            target = self._free_path()
+            target = files.free_path(self._path)
         saved = files.save(self.session, target)
         self._path = saved
         self._recovery.forget()
         self.say(f"saved {saved}.")
-
-    def _free_path(self) -> Path:
-        """A file beside the one that was opened, or here, that does not exist."""
-        folder = self._path.parent if self._path is not None else Path.cwd()
-        stem = self._path.stem if self._path is not None else "contacts"
-        for number in range(1, 10_000):
-            path = folder / f"{stem}{'' if number == 1 else f'-{number}'}{files.SCENE_SUFFIX}"
-            if not path.exists():
-                return path
-        raise FileRefused(f"{folder} is full of files called {stem}: save under a name.")
 
     def write(self, path: Path) -> None:
         """Save under another name, or export, as the suffix says. Raises FileRefused."""
@@ -258,43 +276,6 @@ class Application:
         """dark or light."""
         self.canvas.set_theme(THEMES[name])
         self.drawer.stale = True
-
-    def hide(self, kind: str, name: str) -> None:
-        """Hide a surface or a patch, or show it again."""
-        hidden = self.drawer.hidden_surfaces if kind == "surface" else self.drawer.hidden_patches
-        hidden.symmetric_difference_update({name})
-        self.drawer.stale = True
-
-    def select(self, kind: str, name: str, *, more: bool = False) -> None:
-        """Select from the tree: a patch (more: beside those selected), or the surface that tools work on."""
-        if kind == "surface":
-            now = self.interaction.selection
-            surface = None if now.surface == name else name
-            if surface is None:
-                self.interaction.do("selection.none")
-            else:
-                self.interaction.select(*now.patches, surface=surface)
-            return
-        chosen = self.interaction.selection.patches
-        kept = tuple(each for each in chosen if each != name) if more else ()
-        self.interaction.select(*(kept if more and name in chosen else (*kept, name)))
-
-    def rename(self, patch: str, name: str) -> None:
-        """Give a patch another name. Raises ContactError."""
-        if name and name != patch:
-            self.session.patches.rename(patch, name)
-
-    def recolor(self, patch: str, color: str) -> None:
-        """Give a patch another colour, "#rrggbb"; its partners follow, so that pairs stay recognisable."""
-        document = self.session.document
-        together = {patch, *document.partners(patch)}
-        for pair in document.pairs.values():
-            if {pair.manipulator, pair.object} & together:
-                together |= {pair.manipulator, pair.object}
-        try:
-            self.session.patches.recolor(sorted(together), from_hex(color))
-        except ValueError as error:
-            raise InvalidInput(str(error)) from None
 
     # -- time ----------------------------------------------------------------------------------------------------
 
@@ -351,6 +332,8 @@ class Application:
         """Do what is due, once before each frame: returns what changed, "camera" among it; empty for nothing, so
         that nothing has to be drawn."""
         self.interaction.advance()
+        if self.guide.follow():
+            self._redraw()
         if self.film_open and not self.interaction.is_busy and not self.interaction.film.playback.is_playing:
             self.interaction.film.measure()
         parts = self.drawer.follow()

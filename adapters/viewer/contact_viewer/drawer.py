@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.interaction.interaction import Interaction
-from contact_core.interaction.overlay import Overlay
+from contact_core.interaction.overlay import NOTHING, Overlay
 from contact_viewer.canvas import GHOST, Canvas
 
 
 class Drawer:
-    """Keeps a canvas as an interaction says.
+    """Keeps a canvas as an interaction says, with an overlay `beside` its own.
 
     hidden_surfaces, hidden_patches: names that the artist has hidden; `stale` after they were changed.
     """
 
-    def __init__(self, interaction: Interaction, canvas: Canvas) -> None:
-        self._interaction, self._canvas = interaction, canvas
+    def __init__(
+        self, interaction: Interaction, canvas: Canvas, beside: Callable[[], Overlay] = lambda: NOTHING
+    ) -> None:
+        self._interaction, self._canvas, self._beside = interaction, canvas, beside
         self.hidden_surfaces: set[str] = set()
         self.hidden_patches: set[str] = set()
         self._drawn: dict[str, TriangleMesh] = {}
@@ -35,8 +39,8 @@ class Drawer:
             self._shapes()
         if self.stale or changes.surfaces or "visibility" in parts or "document" in parts:
             self._looks()
-        if self.stale or "overlay" in parts or "document" in parts or changes.surfaces:
-            self._canvas.show(self._visible(self._interaction.overlay()))
+        if self.stale or changes.surfaces or parts & {"overlay", "document", "selection"}:
+            self._canvas.show(self._visible(self._interaction.overlay().joined(self._beside())))
         self.stale = False
         return frozenset(parts)
 

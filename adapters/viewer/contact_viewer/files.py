@@ -138,6 +138,17 @@ def save(session: Session, path: Path | None) -> Path:
     return written or path or Path(getattr(session.host, "path", None) or "")
 
 
+def free_path(opened: Path | None) -> Path:
+    """A scene file that does not exist, beside the file that was opened, or here. Raises FileRefused."""
+    folder = opened.parent if opened is not None else Path.cwd()
+    stem = opened.stem if opened is not None else "contacts"
+    for number in range(1, 10_000):
+        path = folder / f"{stem}{'' if number == 1 else f'-{number}'}{SCENE_SUFFIX}"
+        if not path.exists():
+            return path
+    raise FileRefused(f"{folder} is full of files called {stem}: save under a name.")
+
+
 def _saved_as(session: Session) -> tuple[str, ...]:
     return (*session.host.suffixes, DOCUMENT_SUFFIX) if session.host is not None else (DOCUMENT_SUFFIX,)
 

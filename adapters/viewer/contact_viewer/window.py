@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -84,7 +85,14 @@ class Front:
         top = [app.title, head if app.meets else panel.next_step(app.session, app.interaction)]
         top += [f"undo: {undo}"] if undo else []
         line = " · ".join(part for part in (app.line(), app.refusal()) if part)
+        if app.guide.lesson is not None:
+            top = [wrapped(app.guide.text())]
         app.canvas.write(" · ".join(top), line, help_text(app) if app.help_wanted else "")
+
+
+def wrapped(text: str, width: int = 84) -> str:
+    """Text in lines of at most so many letters."""
+    return "\n".join("\n".join(textwrap.wrap(line, width)) for line in text.splitlines())
 
 
 def help_text(app: Application) -> str:

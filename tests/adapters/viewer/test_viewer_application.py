@@ -334,3 +334,45 @@ def test_a_large_mesh_is_sent_once(hand: Hand) -> None:
     hand.wait()  # what is prepared beside the window on opening shows its progress
     hand.front.tick()
     assert not hand.front.tick()
+
+
+def test_the_tutorial_comes_once_by_itself_and_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    app = application([], tmp_path / "state")
+    hand = Hand(app)
+    card = app.guide.card()
+    assert card is not None and card["title"] == "Paint where the hand touches" and card["progress"] == "0 of 4"
+    assert {"text": "B", "key": True} in card["words"] and "Press B" in app.guide.text()
+    assert len(app.guide.overlay().axes) == 1
+    name = painted(hand)
+    assert (app.guide.card() or {})["progress"] == "1 of 4"
+    hand.key("F2")
+    assert (app.guide.card() or {})["title"] == "Give a contact its axis"
+    hand.key("Shift+F2")
+    hand.key("F1")
+    assert app.guide.card() is None and app.guide.text() == "" and not app.guide.overlay().axes
+    hand.key("F1")  # once more, from the start: one step, and undo brings the contact back
+    assert app.guide.card() is not None and not app.session.document.patches
+    hand.key("Ctrl+Z")
+    assert list(app.session.document.patches) == [name]
+    app.turn_card("end")
+    app.close()
+    again = application([], tmp_path / "other")
+    assert again.guide.lesson is not None
+    again.turn_card("end")
+    again.close()
+    third = application([], tmp_path / "other")
+    assert third.guide.lesson is None
+    third.close()
+
+
+def test_the_tutorial_leaves_other_files_and_they_come_back(hand: Hand, tmp_path: Path) -> None:
+    app = hand.app
+    app.open(["sample:baseball"])
+    app.session.patches.brush("disk", "spot", surface="baseball", at=[0.0, 0.0, 1.0], radius=0.01)
+    app.do("show.tutorial")
+    assert app.guide.lesson is not None and set(app.session.document.surfaces) == {"human_hand", "mug"}
+    app.open(["sample:baseball"])
+    assert app.guide.lesson is None and "spot" in app.session.document.patches

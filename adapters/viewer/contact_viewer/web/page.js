@@ -5,7 +5,7 @@ window.addEventListener('keydown', (event) => {
   if (typing) { if (event.key === 'Escape' || event.key === 'Enter') from.blur(); return; }
   const ctrl = event.ctrlKey || event.metaKey;
   if (event.key.length > 1 && !['Escape', 'Enter', 'Tab', 'Backspace', 'Delete', 'Home', 'End', 'ArrowLeft',
-      'ArrowRight', 'ArrowUp', 'ArrowDown'].includes(event.key)) return;
+      'ArrowRight', 'ArrowUp', 'ArrowDown', 'F1', 'F2'].includes(event.key)) return;
   if (ctrl && ['r', 'w', 't', 'n', 'l', 'c', 'v', '+', '-', '0', 'i', 'j'].includes(event.key.toLowerCase())
       && !(event.shiftKey && event.key.toLowerCase() === 'a')) return;
   event.preventDefault();

@@ -142,6 +142,7 @@ def _top(v3: Any, html: Any) -> None:
         v3.VDivider(vertical=True, classes="mx-1")
         _button(v3, "mdi-fit-to-page-outline", "See all (Home)", click="trigger('act', ['view.home'])")
         _button(v3, "mdi-theme-light-dark", "Dark or light", click="theme = theme === 'dark' ? 'light' : 'dark'")
+        _button(v3, "mdi-school-outline", "Tutorial (F1)", click="trigger('act', ['show.tutorial'])")
         _button(v3, "mdi-keyboard-outline", "Keys (?)", click="help_wanted = !help_wanted")
 
 
@@ -162,6 +163,7 @@ def _tools(v3: Any, html: Any) -> None:
 def _right(v3: Any, html: Any) -> None:
     with v3.VNavigationDrawer(permanent=True, location="right", width=320, color="surface", border="s"):
         with html.Div(style="display: flex; flex-direction: column; height: 100%;"):
+            _card(v3, html)
             with html.Div(classes="contact-head"):
                 html.Span("Surfaces and contacts")
                 html.Span("{{ report.head }}", style="text-transform: none; letter-spacing: 0;",
@@ -185,6 +187,37 @@ def _right(v3: Any, html: Any) -> None:
                 with html.Div(v_for="group in settings", key=("group.slot + group.name",)):
                     html.Div("{{ group.title }}", classes="contact-head")
                     _field(html)
+
+
+def _card(v3: Any, html: Any) -> None:
+    """The card of the tutorial: which step, its words with keys, a tick, and the ways on."""
+    with html.Div(v_if=("card",), classes="contact-card"):
+        with html.Div(classes="steps"):
+            html.Span(
+                v_for="step in card.steps", key=("step.name",), title=("step.name",),
+                classes=("(step.done ? 'done' : '') + (step.now ? ' now' : '')",),
+            )  # fmt: skip
+            html.Span(style="flex: 1;")
+            with html.A(title="End the tutorial (F1)", click="trigger('card', ['end'])"):
+                v3.VIcon("mdi-close", size="16")
+        with html.Div(classes="title"):
+            v3.VIcon("mdi-check-circle", v_if="card.done", size="18", color="success")
+            html.Span("{{ card.title }}")
+            html.Span("{{ card.progress }}", classes="count")
+        with html.Div(classes="words"):
+            with html.Template(v_for="part in card.words", key=("part.text",)):
+                html.Kbd("{{ part.text }}", v_if="part.key")
+                html.Span("{{ part.text }}", v_else=True)
+        with html.Div(v_if="card.far_side", classes="turn"):
+            v3.VIcon("mdi-rotate-3d-variant", size="16")
+            html.Span("The mark is on the far side: drag with the middle button to turn the view.")
+        with html.Div(classes="ways"):
+            v3.VBtn("Back", size="small", variant="text", classes="text-none", disabled=("card.first",),
+                    title="Shift+F2", click="trigger('card', ['back'])")  # fmt: skip
+            html.Span(style="flex: 1;")
+            v3.VBtn("{{ card.over ? 'Close' : card.done ? 'Next' : 'Skip' }}", size="small", classes="text-none",
+                    variant=("card.done ? 'flat' : 'text'",), color=("card.done ? 'primary' : undefined",),
+                    title="F2", click="trigger('card', ['next'])")  # fmt: skip
 
 
 def _tree_row(v3: Any, html: Any) -> None:

@@ -181,6 +181,7 @@ class WebApplication:
         told("rename")(lambda patch, name: app.rename(str(patch), str(name).strip()))
         told("recolor")(lambda patch, color: app.recolor(str(patch), str(color)))
         told("set")(lambda slot, name, item, value: panel.set_setting(app.interaction, slot, name, item, value))
+        told("card")(lambda which: app.turn_card(str(which)))
         told("go_to")(lambda frame: app.go_to(float(frame)))
         told("film_drag")(
             lambda what, name, frame, part, to: drag(
@@ -271,10 +272,13 @@ class WebApplication:
             told["help_wanted"] = self._help_told = app.help_wanted
         if app.wants is not None:
             told[f"{app.wants}_wanted"], app.wants = True, None
+        if everything or pending & {"document", "selection", "status", "camera"}:
+            told["card"] = app.guide.card()
         if everything or pending & {"document", "selection", "surfaces", "visibility", "status"}:
             told["tree"] = app.tree()
             told["report"] = panel.report(app.meets, app.interaction.desk.document)
-            told["next_step"] = panel.next_step(app.session, app.interaction)
+            taught = app.guide.lesson is not None
+            told["next_step"] = "" if taught else panel.next_step(app.session, app.interaction)
         if everything or pending & {"document", "surfaces", "film"}:
             told["film"] = self._film()
         if everything or pending & {"tool", "settings", "visibility"}:
