@@ -42,7 +42,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="60 shots")
     parser.add_argument("--shots", type=int, help=f"how many ({SHOTS})")
+    parser.add_argument("--waiting", action="store_true", help="only jobs that wait: how they spread over workers")
     arguments, _ = parser.parse_known_args()
+    if arguments.waiting:
+        with tempfile.TemporaryDirectory() as name:
+            record("Farm: jobs that wait", waiting(Path(name)))
+        return
     count = arguments.shots or (60 if arguments.quick else SHOTS)
     warm_up()
     with tempfile.TemporaryDirectory() as name:
@@ -140,6 +145,44 @@ def killed(folder: Path) -> str:
     return (
         f"{count} kills, {lost} of {len(result.results)} results lost or other, {time.perf_counter() - began:.1f} s"
     )
+
+
+WAITING = """
+import time
+from contact_core.atomic_file import write_atomic
+from contact_core.plugins import hookimpl
+from contact_core.plugins.slots import JobOutcome
+
+class Wait:
+    name, summary, suffixes = "wait", "a job that waits", (".wait",)
+    def claims(self, path): return True
+    def run(self, request, plugins, progress):
+        time.sleep(1.0)
+        write_atomic(request.folder / "done.txt", "done")
+        return JobOutcome(("done.txt",))
+
+@hookimpl
+def contact_job_kinds(): return [Wait]
+"""
+
+
+def waiting(folder: Path) -> dict[str, str]:
+    """How jobs spread over workers on a machine whose cores others use: each waits 1 s and needs no core."""
+    (folder / "waiting_jobs.py").write_text(WAITING)
+    os.environ |= {"CONTACT_PLUGINS": "waiting_jobs"}
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])
+    sys.path.insert(0, str(folder))
+    (folder / "jobs").mkdir()
+    for number in range(41):
+        (folder / "jobs" / f"{number:02d}.wait").touch()
+    seconds = {}
+    for count in (1, 2):
+        batch = run_batch([folder / "jobs"], folder / f"out{count}", workers=LocalWorkers(count))
+        assert batch.is_done
+        one = run_batch([folder / "jobs" / "00.wait"], folder / f"one{count}", workers=LocalWorkers(count))
+        seconds[count] = batch.seconds - one.seconds  # without the start of a worker
+    told = {count: f"{each:.1f} s for 40 jobs of 1 s" for count, each in seconds.items()}
+    return {"1 worker": told[1], "2 workers": f"{told[2]}, {seconds[1] / seconds[2]:.2f} times as fast"}
 
 
 def results_of(out: Path, name: str) -> dict[str, bytes]:
