@@ -13,7 +13,7 @@ import numpy as np
 
 from contact_core.arrays import ComplexArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.geometry.kernel_arrays import Points, plain
+from contact_core.geometry.kernel_arrays import Goal, Points, plain
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
@@ -101,13 +101,14 @@ def log_map(
     count = len(targets)
     anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
     distance, headings = np.empty(count), np.empty(count, np.complex128)
+    goal = _goal(mesh, targets)
     halfedges, starts, ends = plain(topology.halfedges), plain(sources.arrays), plain(targets.arrays)
     with Workspace.lent(mesh) as work:
         records = plain(work.targets(count))
         while True:
             labels = plain(work.labels)
             status, element = kernels.search(
-                starts, ends, limit, halfedges, labels, plain(work.windows), plain(work.queue), records
+                starts, ends, limit, halfedges, labels, plain(work.windows), plain(work.queue), records, goal
             )
             if status != kernels.NO_ROOM:
                 break
@@ -158,6 +159,12 @@ def parallel_transport(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoi
     Source: Sharp, Soliman and Crane 2019, section 5.2: angles to the geodesic stay. Raises as exact_geodesic.
     """
     return exact_geodesic(mesh, start, end).transport(vectors)
+
+
+def _goal(mesh: TriangleMesh, targets: SurfacePoints) -> Goal:
+    """Where the search goes, as kernels take it: straight for a target that is alone, else nowhere."""
+    x, y, z = targets.positions(mesh)[0].tolist() if len(targets) == 1 else (0.0, 0.0, 0.0)
+    return plain(Goal(mesh.points, x, y, z, int(len(targets) == 1)))
 
 
 _NO_LINE = plain(Points(np.empty(0, np.int64), np.empty((0, 3))))  # no polyline is asked for

@@ -53,8 +53,8 @@ class Windows(NamedTuple):
     """Records of w windows, whose columns are named in `window_kernels`, and who occupies which apex.
 
     floats: (w, 10). integers: (w, 4).
-    occupied: (3m, 5) per halfedge that windows entered a face through: epoch; distance at the apex of the window
-        that occupies it, where its ray to the apex crosses the halfedge, its interval.
+    occupied: (3m, 6) per halfedge that windows entered a face through: epoch; distance at the apex of the window
+        that occupies it, where its ray to the apex crosses the halfedge, its interval, the distance of its root.
     """
 
     floats: FloatArray
@@ -86,6 +86,19 @@ class Points(NamedTuple):
 
     faces: IntArray
     barycentric: FloatArray
+
+
+class Goal(NamedTuple):
+    """The place that a search is for, where it is for one alone.
+
+    points: (n, 3) of the mesh. x, y, z: the place. sought: 1 where there is one, else 0.
+    """
+
+    points: FloatArray
+    x: float
+    y: float
+    z: float
+    sought: int
 
 
 class Window(NamedTuple):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from contact_core.geometry.jit import constant, inlined, kernel
-from contact_core.geometry.kernel_arrays import Halfedges, Labels, Path, Points, Queue, Targets, Windows
+from contact_core.geometry.kernel_arrays import Goal, Halfedges, Labels, Path, Points, Queue, Targets, Windows
 from contact_core.geometry.queue_kernels import (
     FREE,
     HEAP_SIZE,
@@ -54,6 +54,7 @@ from contact_core.geometry.window_kernels import (
     distance_at,
     is_displaced,
     propagate,
+    vertex_key,
     windows_of_pseudo_source,
     windows_of_source,
 )
@@ -189,6 +190,7 @@ def seed(
     windows: Windows,
     queue: Queue,
     targets: Targets,
+    goal: Goal,
 ) -> tuple[int, int]:
     """Start windows into all faces at source s; returns (status, blocked element)."""
     on, element, x, y = place_of(sources, s, mesh)
@@ -205,7 +207,7 @@ def seed(
         base = mesh.first[element]
     start = base
     while True:
-        windows_of_source(base, x, y, on, -1 - s, bound, mesh, labels, windows, queue)
+        windows_of_source(base, x, y, on, -1 - s, bound, mesh, labels, windows, queue, goal)
         update_targets_beside(base, x, y, -1 - s, labels, targets)
         if on == ON_FACE:
             break
@@ -231,6 +233,7 @@ def search(
     windows: Windows,
     queue: Queue,
     targets: Targets,
+    goal: Goal,
 ) -> tuple[int, int]:
     """Spread from the sources until every target within `limit` is final; returns (status, blocked element)."""
     sources = Points(*sources)
@@ -240,6 +243,7 @@ def search(
     windows = Windows(*windows)
     queue = Queue(*queue)
     targets = Targets(*targets)
+    goal = Goal(*goal)
     queue.state[:] = 0
     queue.state[FREE] = -1
     queue.keys[len(queue.keys) - 1] = -1.0
@@ -247,7 +251,7 @@ def search(
     if element >= 0:
         return MET_BLOCKED_EDGE, element
     for s in range(len(sources.faces)):
-        status, element = seed(s, sources, limit, mesh, labels, windows, queue, targets)
+        status, element = seed(s, sources, limit, mesh, labels, windows, queue, targets, goal)
         if status != DONE:
             return status, element
     patience = max(CHECK_EVERY, len(targets.floats))
@@ -261,22 +265,22 @@ def search(
         queue.state[POPS] += 1
         if item < 0:
             v = -1 - item
-            if labels.origin[v, 2] == 1 or labels.reach[v, 1] < key:
+            if labels.origin[v, 2] == 1 or vertex_key(v, labels.reach[v, 1], goal) < key:
                 continue
             if mesh.kind[v] == BLOCKED_VERTEX:
                 return MET_BLOCKED_VERTEX, v
-            windows_of_pseudo_source(v, bound, mesh, labels, windows, queue)
+            windows_of_pseudo_source(v, bound, mesh, labels, windows, queue, goal)
         else:
             if windows.integers[item, HALFEDGE] < 0:
                 return MET_BLOCKED_EDGE, -1 - windows.integers[item, HALFEDGE]
-            if from_heap:
+            if from_heap and goal.sought == 0:
                 base = 3 * (windows.integers[item, HALFEDGE] // 3)
                 queue.keys[len(queue.keys) - 1] = key + min(
                     mesh.shape[base, 0], mesh.shape[base + 1, 0], mesh.shape[base + 2, 0]
                 )
             if not is_displaced(item, mesh, labels, windows):
                 update_targets(item, mesh, labels, windows, targets)
-                propagate(item, bound, mesh, labels, windows, queue)
+                propagate(item, bound, mesh, labels, windows, queue, goal)
             windows.integers[item, HALFEDGE] = queue.state[FREE]
             queue.state[FREE] = item
         if queue.state[POPS] >= next_check:

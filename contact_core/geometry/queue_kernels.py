@@ -5,7 +5,8 @@ has reached, and is dropped. Only vertices need the order, to be final when they
 that leaves the heap sets a horizon further off by the shortest edge of its face (the last of `keys`), and windows
 that lie within it go on from the stack: one in a hundred comes too early, but most of the heap's work is saved, and
 a child follows its parent while their faces are in the cache (W 1.12 to 0.85 ms). A vertex waits in the heap, so
-that all nearer windows go before it.
+that all nearer windows go before it. A search for one place (A*) uses the heap alone: there a window that comes too
+early leads astray (2.5 times the pops on 1.1M faces).
 
 `keys` and `items` are both the heap, from their beginning, and `items` the stack, from its end.
 """

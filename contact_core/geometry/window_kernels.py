@@ -11,6 +11,11 @@ path to the apex, which occupies it, keeps both children (`Windows.occupied`). A
 through a vertex beside it is shorter. Two windows with the same image (along mirrored paths round a fold) go on as
 one: else windows would double at every fold.
 
+Where one place alone is sought the order is that of A* (Hart, Nilsson and Raphael 1968): the least length of a path
+through the window that goes on straight through space. No path on the surface is shorter, and the least length
+never falls on the way, so a vertex is final when it leaves the queue, as in order of distance; but what leads
+elsewhere is never looked at.
+
 Work arrays belong to a mesh and are never cleared: what carries an older epoch counts as empty, so a query touches
 no more memory than its region has.
 """
@@ -20,7 +25,7 @@ from __future__ import annotations
 import math
 
 from contact_core.geometry.jit import constant, inlined, kernel
-from contact_core.geometry.kernel_arrays import Halfedges, Labels, Path, Queue, Window, Windows
+from contact_core.geometry.kernel_arrays import Goal, Halfedges, Labels, Path, Queue, Window, Windows
 from contact_core.geometry.queue_kernels import FREE, OVERFLOW, USED, WINDOWS, heap_push, stack_push
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
@@ -61,6 +66,7 @@ MOST_SLACK = 1e-6
 TOUCHING = 1e3
 INSIDE = constant(0)  # of a path that does not touch the rim of its window
 SURELY = 1.0 - 1e-14  # relative margin for "shorter": rounding must not decide
+AT_LEAST = 1.0 - 1e-11  # relative margin of a lower bound: of paths of equal length none may be cut off by rounding
 
 
 @inlined
@@ -69,8 +75,40 @@ def distance_at(v: int, labels: Labels) -> float:
     return labels.reach[v, 1] if labels.reach[v, 0] == labels.epoch else math.inf
 
 
+@inlined
+def vertex_key(v: int, distance: float, goal: Goal) -> float:
+    """What vertex v leaves the queue by: its distance, or the least length of a path through it to the goal."""
+    if goal.sought == 0:
+        return distance
+    x, y, z = goal.points[v, 0] - goal.x, goal.points[v, 1] - goal.y, goal.points[v, 2] - goal.z
+    return AT_LEAST * (distance + math.sqrt(x * x + y * y + z * z))
+
+
+@inlined
+def window_key(
+    b0: float, b1: float, sx: float, sy: float, tail: int, head: int, length: float, goal: Goal
+) -> float:
+    """The least length of a path from the root at (sx, sy) through the interval [b0, b1] of an edge, straight on
+    through space to the goal.
+
+    Points of the edge are as far from the goal as from its image in the plane of the root, beyond the edge: so the
+    two legs are shortest where the line between the images crosses the edge.
+    """
+    points = goal.points
+    ax, ay, az = points[tail, 0], points[tail, 1], points[tail, 2]
+    ux, uy, uz = (points[head, 0] - ax) / length, (points[head, 1] - ay) / length, (points[head, 2] - az) / length
+    gx, gy, gz = goal.x - ax, goal.y - ay, goal.z - az
+    cx, cy, cz = uy * gz - uz * gy, uz * gx - ux * gz, ux * gy - uy * gx
+    tx, ty = ux * gx + uy * gy + uz * gz, math.sqrt(cx * cx + cy * cy + cz * cz)
+    p = sx if ty - sy <= 0.0 else sx - (tx - sx) * sy / (ty - sy)
+    p = min(max(p, b0), b1)
+    return norm(p - sx, sy) + norm(p - tx, ty)
+
+
 @kernel
-def update_vertex(v: int, path: Path, bound: float, mesh: Halfedges, labels: Labels, queue: Queue) -> None:
+def update_vertex(
+    v: int, path: Path, bound: float, mesh: Halfedges, labels: Labels, queue: Queue, goal: Goal
+) -> None:
     """Label v with a shorter path, and queue it as a pseudo-source if paths can bend there."""
     reach, leg, origin = labels.reach, labels.leg, labels.origin
     if reach[v, 0] == labels.epoch and origin[v, 2] == 1:  # its windows have left: it keeps its path
@@ -79,13 +117,21 @@ def update_vertex(v: int, path: Path, bound: float, mesh: Halfedges, labels: Lab
     leg[v, 0], leg[v, 1] = path.zx, path.zy
     leg[v, 2] = angle_round_vertex(path.halfedge, path.x, path.y, mesh)
     origin[v, 0], origin[v, 1], origin[v, 2], origin[v, 3] = path.root, path.wedge, 0, path.touches
-    if path.distance <= bound and bends_paths(v, mesh):
-        heap_push(path.distance, -1 - v, queue)
+    key = vertex_key(v, path.distance, goal)
+    if key <= bound and bends_paths(v, mesh):
+        heap_push(key, -1 - v, queue)
 
 
 @inlined
 def push_window(
-    edge: int, window: Window, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue
+    edge: int,
+    window: Window,
+    bound: float,
+    mesh: Halfedges,
+    labels: Labels,
+    windows: Windows,
+    queue: Queue,
+    goal: Goal,
 ) -> None:
     """Queue a window that leaves a face through `edge`, unless it is empty, off the surface, too far, or dominated
     by a path through a vertex next to it (Xin and Wang 2009)."""
@@ -96,11 +142,14 @@ def push_window(
     if not b1 > b0 or h == BOUNDARY:
         return
     to_b0, to_b1 = norm(b0 - sx, sy), norm(b1 - sx, sy)
-    key = sigma + (to_b0 if sx <= b0 else (to_b1 if sx >= b1 else -sy))
+    left, right = mesh.tail[following(edge)], mesh.tail[edge]  # the other side runs the other way
+    if goal.sought == 0:
+        key = sigma + (to_b0 if sx <= b0 else (to_b1 if sx >= b1 else -sy))
+    else:
+        key = AT_LEAST * (sigma + window_key(b0, b1, sx, sy, left, right, length, goal))
     if key > bound:
         return
     d0, d1 = (sigma + to_b0) * SURELY, (sigma + to_b1) * SURELY
-    left, right = mesh.tail[following(edge)], mesh.tail[edge]  # the other side runs the other way
     if distance_at(left, labels) + b1 < d1 or distance_at(right, labels) + (length - b0) < d0:
         return
     if side != ONLY_CHILD:
@@ -139,7 +188,9 @@ def push_window(
 
 
 @inlined
-def propagate(w: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue) -> None:
+def propagate(
+    w: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue, goal: Goal
+) -> None:
     """Carry window w across its face: to the apex if its cone holds it, and through the other two edges."""
     record = windows.floats[w]
     b0, b1, sx, sy, sigma = record[B0], record[B1], record[SX], record[SY], record[SIGMA]
@@ -176,7 +227,7 @@ def propagate(w: int, bound: float, mesh: Halfedges, labels: Labels, windows: Wi
                 -ry * cx + rx * cy,
                 1 if beyond_left >= -TOUCHING * left_lean or beyond_right >= -TOUCHING * right_lean else 0,
             )
-            update_vertex(apex, path, bound, mesh, labels, queue)
+            update_vertex(apex, path, bound, mesh, labels, queue, goal)
         if sharp:  # one angle, one split
             crossing = sx - rx * sy / ry if ry > 0.0 else sx
             split_distance, split_crossing = distance, crossing
@@ -184,15 +235,18 @@ def propagate(w: int, bound: float, mesh: Halfedges, labels: Labels, windows: Wi
             occupier, crossed = seat[1], seat[2]
             if seat[0] != labels.epoch:
                 seat[0], seat[1], seat[2], seat[3], seat[4] = labels.epoch, distance, crossing, b0, b1
+                seat[5] = sigma
             elif (
                 max(distance, occupier) * SURELY <= min(distance, occupier)
                 and abs(crossing - crossed) <= GRAZING * length
+                and abs(sigma - seat[5]) <= GRAZING * length
             ):
                 # the same image again, along a path of the same length: on each side the wider window goes on
+                # (of two on one ray, one seen past the other, each goes on: their rays part behind the apex)
                 left, right = b0 < seat[3] - GRAZING * length, b1 > seat[4] + GRAZING * length
                 seat[3], seat[4] = min(b0, seat[3]), max(b1, seat[4])
             elif distance < occupier:
-                seat[1], seat[2], seat[3], seat[4] = distance, crossing, b0, b1
+                seat[1], seat[2], seat[3], seat[4], seat[5] = distance, crossing, b0, b1, sigma
             elif distance * SURELY > occupier:
                 left = crossing < crossed + GRAZING * length
                 right = crossing > crossed - GRAZING * length
@@ -215,7 +269,7 @@ def propagate(w: int, bound: float, mesh: Halfedges, labels: Labels, windows: Wi
             wedge,
             LEFT_CHILD,
         )
-        push_window(to_left, window, bound, mesh, labels, windows, queue)
+        push_window(to_left, window, bound, mesh, labels, windows, queue, goal)
     if right:  # the same, seen in a mirror that puts the head at the origin
         ux, uy = direction_of_next(h, mesh)
         ux, uy = -ux, -uy
@@ -238,7 +292,7 @@ def propagate(w: int, bound: float, mesh: Halfedges, labels: Labels, windows: Wi
             wedge,
             RIGHT_CHILD,
         )
-        push_window(to_right, window, bound, mesh, labels, windows, queue)
+        push_window(to_right, window, bound, mesh, labels, windows, queue, goal)
 
 
 @inlined
@@ -258,7 +312,7 @@ def is_displaced(w: int, mesh: Halfedges, labels: Labels, windows: Windows) -> b
 
 @kernel
 def windows_of_pseudo_source(
-    v: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue
+    v: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue, goal: Goal
 ) -> None:
     """Queue the windows of pseudo-source v: all directions at half a turn or more, on both sides, from direction
     leg[v, 2] back along its path; and label its neighbours."""
@@ -284,13 +338,13 @@ def windows_of_pseudo_source(
                     vx, vy = direction_in_face(h, mesh)
                     bx, by = -vx * ux - vy * uy, -vy * ux + vx * uy
                 path = Path(distance, v, h, x, y, arrival, bx, by, INSIDE)
-                update_vertex(neighbour, path, bound, mesh, labels, queue)
+                update_vertex(neighbour, path, bound, mesh, labels, queue, goal)
         start = mesh.shape[h, 3]
         for part in range(2):
             a0 = max((low if part == 0 else low_too) - start, 0.0)
             a1 = min((high if part == 0 else high_too) - start, corner)
             if a1 > a0:
-                window_from_corner(h, a0, a1, corner, sigma, v, bound, mesh, labels, windows, queue)
+                window_from_corner(h, a0, a1, corner, sigma, v, bound, mesh, labels, windows, queue, goal)
         h = mesh.twin[backward]
         if h < 0 or h == mesh.first[v]:
             break
@@ -309,6 +363,7 @@ def window_from_corner(
     labels: Labels,
     windows: Windows,
     queue: Queue,
+    goal: Goal,
 ) -> None:
     """Cast a window from the tail of h, between angles a0 < a1 from h, through the opposite edge."""
     opposite = following(h)
@@ -326,7 +381,7 @@ def window_from_corner(
     window = Window(
         b0, b1, -ax * ux - ay * uy, -ay * ux + ax * uy, sigma, ux, uy, GRAZING, -1.0, 0.0, root, h, ONLY_CHILD
     )
-    push_window(opposite, window, bound, mesh, labels, windows, queue)
+    push_window(opposite, window, bound, mesh, labels, windows, queue, goal)
 
 
 @kernel
@@ -341,6 +396,7 @@ def windows_of_source(
     labels: Labels,
     windows: Windows,
     queue: Queue,
+    goal: Goal,
 ) -> None:
     """Start windows from the source at (x, y) in the frame of halfedge `base` out of its face; label its corners.
 
@@ -357,13 +413,13 @@ def windows_of_source(
         v = mesh.tail[h]
         if distance < distance_at(v, labels):
             path = Path(distance, root, base, corner_x - from_x, corner_y - from_y, h, x, y, INSIDE)
-            update_vertex(v, path, bound, mesh, labels, queue)
+            update_vertex(v, path, bound, mesh, labels, queue, goal)
         length = mesh.shape[h, 0]
         if side == 1 or on == ON_FACE or (side == 2 and on == ON_EDGE):
             window = Window(
                 0.0, length, length - x, -y, 0.0, -cos, -sin, GRAZING, -1.0, 0.0, root, base, ONLY_CHILD
             )
-            push_window(h, window, bound, mesh, labels, windows, queue)
+            push_window(h, window, bound, mesh, labels, windows, queue, goal)
         h_next = following(h)
         ux, uy = direction_of_next(h, mesh)
         x -= length

@@ -28,7 +28,7 @@ class Workspace:
         reach, leg = np.zeros((point_count, 2)), np.zeros((point_count, 3))
         origin = np.zeros((point_count, 4), np.int64)
         self.labels = Labels(0.0, reach, leg, origin)
-        self._occupied: FloatArray = np.zeros((3 * face_count, 5))
+        self._occupied: FloatArray = np.zeros((3 * face_count, 6))
         self._waiting: FloatArray = np.zeros((face_count, 2))
         arrays: tuple[Any, ...] = (reach, leg, origin, self._occupied, self._waiting)
         if sum(array.nbytes for array in arrays) <= TOUCHED:

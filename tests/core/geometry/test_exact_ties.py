@@ -89,3 +89,24 @@ def test_exp_after_log_is_the_identity_on_lattices(kind: str) -> None:
             np.repeat(np.arange(len(bends)), bends), log.lengths, minlength=len(bends)
         )
         np.testing.assert_allclose(total, log.distance, rtol=1e-13, atol=1e-13)
+
+
+def test_of_two_images_on_one_ray_both_go_on() -> None:
+    """A source seen past a saddle, and the saddle itself: of one distance, on one ray, and yet rays part behind."""
+    mesh = KINDS["two levels"](103)
+    middle, edge = SurfacePoints([52], [[1 / 3, 1 / 3, 1 / 3]]), SurfacePoints([14], [[0.5, 0.0, 0.5]])
+    everything = SurfacePoints.at_vertices(mesh, np.arange(len(mesh.points)))
+    there, back = log_map(mesh, middle, everything), log_map(mesh, everything, middle)
+    each = [log_map(mesh, everything[k], middle[[0, 0]]).distance[0] for k in range(len(everything))]
+    np.testing.assert_allclose(there.distance, each, rtol=1e-13)
+    assert back.distance[0] == pytest.approx(min(each), rel=1e-13)
+    assert log_map(mesh, middle, edge[[0, 0]]).distance[0] == pytest.approx(5.857351157794078, rel=1e-13)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_distances_on_lattices_are_the_same_both_ways(kind: str) -> None:
+    for seed in range(100, 106):
+        mesh, random = KINDS[kind](seed), np.random.default_rng(seed)
+        points = special_points(mesh, 24, random)
+        d = np.stack([log_map(mesh, points[k], points).distance for k in range(len(points))])
+        np.testing.assert_allclose(d, d.T, rtol=1e-12, atol=1e-14)
