@@ -19,7 +19,7 @@ def transported(mesh: TriangleMesh, root: Root, to: SurfacePoints) -> Root:
     """
     if len(to) != 1:
         raise InvalidInput(f"a patch is moved to one surface point, but got {len(to)}.")
-    log = log_map(mesh, root.point(), to)
+    log = log_map(mesh, root.point(), to, seek=True)
     if log.anchor[0] < 0:
         raise Unreached("no path on the surface leads from the patch to that point; transfer it instead.")
     if log.distance[0] == 0.0:

@@ -80,9 +80,17 @@ class Geodesic:
 
 
 def log_map(
-    mesh: TriangleMesh, sources: SurfacePoints, targets: SurfacePoints, max_distance: float | None = None
+    mesh: TriangleMesh,
+    sources: SurfacePoints,
+    targets: SurfacePoints,
+    max_distance: float | None = None,
+    *,
+    seek: bool = False,
 ) -> LogMap:
     """The log map of k targets from the nearest of s >= 1 sources, exact, in one propagation for all of them.
+
+    seek: a target that is alone is sought by A*, many times quicker (ADR 0014); of paths of one length another may
+    be found.
 
     The search ends as soon as every target is final, and never goes beyond max_distance (surface units): its time
     and memory depend on that region, not on the mesh. A target on another component costs a search of the whole
@@ -101,7 +109,7 @@ def log_map(
     count = len(targets)
     anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
     distance, headings = np.empty(count), np.empty(count, np.complex128)
-    goal = _goal(mesh, targets)
+    goal = _goal(mesh, targets, seek)
     halfedges, starts, ends = plain(topology.halfedges), plain(sources.arrays), plain(targets.arrays)
     with Workspace.lent(mesh) as work:
         records = plain(work.targets(count))
@@ -161,10 +169,11 @@ def parallel_transport(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoi
     return exact_geodesic(mesh, start, end).transport(vectors)
 
 
-def _goal(mesh: TriangleMesh, targets: SurfacePoints) -> Goal:
+def _goal(mesh: TriangleMesh, targets: SurfacePoints, seek: bool) -> Goal:
     """Where the search goes, as kernels take it: straight for a target that is alone, else nowhere."""
-    x, y, z = targets.positions(mesh)[0].tolist() if len(targets) == 1 else (0.0, 0.0, 0.0)
-    return plain(Goal(mesh.points, x, y, z, int(len(targets) == 1)))
+    alone = seek and len(targets) == 1
+    x, y, z = targets.positions(mesh)[0].tolist() if alone else (0.0, 0.0, 0.0)
+    return plain(Goal(mesh.points, x, y, z, int(alone)))
 
 
 _NO_LINE = plain(Points(np.empty(0, np.int64), np.empty((0, 3))))  # no polyline is asked for

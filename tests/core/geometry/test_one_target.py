@@ -16,13 +16,13 @@ from tests.core.geometry.test_exact_ties import KINDS, special_points
 def everywhere(
     mesh: TriangleMesh, sources: SurfacePoints, target: SurfacePoints, limit: float | None = None
 ) -> LogMap:
-    """The same by a search that spreads like a wave: two targets are not alone."""
-    return log_map(mesh, sources, target[[0, 0]], limit)
+    """The same by a search that spreads like a wave."""
+    return log_map(mesh, sources, target, limit)
 
 
 def agrees(mesh: TriangleMesh, sources: SurfacePoints, target: SurfacePoints) -> tuple[int, int]:
     """Hold one against the other; returns the work of both. Of paths of one length either may have been found."""
-    log, full = log_map(mesh, sources, target), everywhere(mesh, sources, target)
+    log, full = log_map(mesh, sources, target, seek=True), everywhere(mesh, sources, target)
     assert (log.anchor[0] < 0) == (full.anchor[0] < 0)
     if log.anchor[0] < 0:
         return log.pops, full.pops
@@ -58,7 +58,7 @@ def test_a_limit_is_one_for_it_too(data: st.DataObject, name: str, share: float)
     distance = everywhere(mesh, source, target).distance[0]
     if not np.isfinite(distance) or abs(share - 1.0) < 1e-6:
         return
-    log = log_map(mesh, source, target, share * distance)
+    log = log_map(mesh, source, target, share * distance, seek=True)
     assert log.distance[0] == pytest.approx(
         everywhere(mesh, source, target, share * distance).distance[0], rel=1e-12
     )

@@ -214,8 +214,7 @@ def test_the_point_that_was_grabbed_stays_under_the_pointer() -> None:
     artist.hands.take_up("move")
     artist.drag(held, held + by(20.0, -10.0), held + by(60.0, 20.0))
     at = artist.pixel("ball", artist.session.geometry.points("spot"))[18]
-    # pixels: a vertex of the ball turns by 0.02 rad, about one of them, what passes it on the other side
-    assert np.linalg.norm(at - (held + by(60.0, 20.0))) < 4.0
+    assert np.linalg.norm(at - (held + by(60.0, 20.0))) < 1.0  # a pixel: the ball has flat faces
 
 
 def test_a_bend_follows_the_pointer_and_is_spread() -> None:
