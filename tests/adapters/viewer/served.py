@@ -84,8 +84,8 @@ class Page:
     first_line: str = ""
 
     @classmethod
-    def opened(cls, browser: Any, address: str, scale: float = 1.0) -> Page:
-        page = browser.new_page(viewport={"width": 1000, "height": 640}, device_scale_factor=scale)
+    def opened(cls, browser: Any, address: str, scale: float = 1.0, size: tuple[int, int] = (1000, 640)) -> Page:
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]}, device_scale_factor=scale)
         errors: list[str] = []
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(address)
@@ -118,6 +118,11 @@ class Page:
         box = self.page.locator(IMAGE).bounding_box()
         return round(box["width"]), round(box["height"])
 
+    def corner(self) -> tuple[float, float]:
+        """Where the view's upper left corner is in the page."""
+        box = self.page.locator(IMAGE).bounding_box()
+        return box["x"], box["y"]
+
     def image(self) -> bytes:
         """The file of the image that is shown."""
         script = f"""async () => {{
@@ -133,8 +138,8 @@ class Page:
 
     def drag_pixels(self, *path: tuple[float, float]) -> None:
         """The same by pixels of the view; no faster than a hand."""
-        box, mouse = self.page.locator(IMAGE).bounding_box(), self.page.mouse
-        places = [(box["x"] + x, box["y"] + y) for x, y in path]
+        (left, top), mouse = self.corner(), self.page.mouse
+        places = [(left + x, top + y) for x, y in path]
         mouse.move(*places[0])
         mouse.down()
         for place in places[1:]:
