@@ -16,5 +16,7 @@ def test_the_table_of_keys_is_that_of_the_code(repository: Path) -> None:
 
 
 def test_its_pictures_are_there_and_small(repository: Path) -> None:
-    pictures = list((repository / "docs" / "images").glob("app-*"))
+    images = repository / "docs" / "images"
+    pictures = list(images.glob("app-*.jpg"))
     assert len(pictures) >= 3 and all(picture.stat().st_size < 300_000 for picture in pictures)
+    assert (images / "app-workflow.gif").stat().st_size < 3_000_000  # the film of `.ci/app_film.py`
