@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from contact_core.errors import ContactError
-from contact_core.job.grasp import HAND, OBJECT, prepare, sheet
+from contact_core.grasp_files.grasp import HAND, OBJECT, prepare, sheet
 from contact_core.library.applying import Applied, apply
 from contact_core.library.capture import captured
 from contact_core.library.verbs import library_scene

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from motion_scenes import sitting
 
+from contact_core.film.film import SKIN, THING
 from contact_core.geometry.transform import transform_points
-from contact_core.job.film import SKIN, THING
 from contact_core.motion.solving import MotionSolution, solve_motion
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import RENDERERS

@@ -43,8 +43,8 @@ class Grasp:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.cli.library import library_of
+        from contact_core.grasp_files.grasp import grasp
         from contact_core.grasping.suggest import GraspSettings
-        from contact_core.job.grasp import grasp
 
         like = None
         if arguments.like is not None:

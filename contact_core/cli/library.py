@@ -151,8 +151,8 @@ def _spelt(value: Any) -> str:
 
 def _save(arguments: argparse.Namespace) -> int:
     from contact_core.errors import InvalidInput
+    from contact_core.grasp_files.library import save_file
     from contact_core.grasping.slots import KINDS
-    from contact_core.job.library import save_file
     from contact_core.library.shelf import Library as Shelf
 
     folder = arguments.library or os.environ.get(VARIABLE)
@@ -172,7 +172,7 @@ def _save(arguments: argparse.Namespace) -> int:
 
 
 def _apply(arguments: argparse.Namespace) -> int:
-    from contact_core.job.library import apply_files
+    from contact_core.grasp_files.library import apply_files
 
     at = None if arguments.at is None else tuple(arguments.scale * x for x in arguments.at)
     result = apply_files(
@@ -207,7 +207,7 @@ def _sheet(arguments: argparse.Namespace) -> int:
 
 def _make(arguments: argparse.Namespace) -> int:
     from contact_core.errors import FileRefused
-    from contact_core.job.starter_making import write_starter
+    from contact_core.grasp_files.starter_making import write_starter
     from contact_core.library.shelf import Library as Shelf
 
     if arguments.out.exists() and any(arguments.out.iterdir()):

@@ -49,9 +49,9 @@ class Motion:
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.atomic_file import write_atomic
         from contact_core.errors import InvalidInput
-        from contact_core.job.clip import write_clip
-        from contact_core.job.film import figures_of, words_of, write_strip
-        from contact_core.job.movie import check_movie, write_movie
+        from contact_core.film.clip import write_clip
+        from contact_core.film.film import figures_of, words_of, write_strip
+        from contact_core.film.movie import check_movie, write_movie
         from contact_core.opening import open as open_scene
 
         out, progress = arguments.out, arguments.output

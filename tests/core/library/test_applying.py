@@ -12,9 +12,9 @@ from contact_core.document.library import ContactSet
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.transform import transform_points
+from contact_core.grasp_files.grasp import HAND, OBJECT, prepare
 from contact_core.grasping.hand import hand_of
 from contact_core.hands.describe import describe_hand
-from contact_core.job.grasp import HAND, OBJECT, prepare
 from contact_core.library.applying import apply, carried_places
 from contact_core.library.carrying import carried, palm_in_rig
 from contact_core.library.record import Grasp, dump_grasp, parse_grasp

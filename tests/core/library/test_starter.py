@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contact_core.job.grasp import HAND, OBJECT, prepare
-from contact_core.job.starter import GraspType, starter_types
-from contact_core.job.starter_making import made
+from contact_core.grasp_files.grasp import HAND, OBJECT, prepare
+from contact_core.grasp_files.starter import GraspType, starter_types
+from contact_core.grasp_files.starter_making import made
 from contact_core.library.starter import starter_library
 from contact_core.library.verbs import apply_grasp
 from contact_core.plugins.manager import PluginManager

@@ -19,12 +19,12 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
+from contact_core.grasp_files.starter import FINGERS, GraspType, starter_types
 from contact_core.grasping.closing import close_hands
 from contact_core.grasping.hand import STRETCH_PRICE, STRETCHED, Hand, stretches, turn_about
 from contact_core.grasping.pads import disk
 from contact_core.grasping.suggest import GraspScene, Suggestion, finished
 from contact_core.hands.description import Pad
-from contact_core.job.starter import FINGERS, GraspType, starter_types
 from contact_core.library.capture import bone_ends, captured
 from contact_core.library.carrying import palm_in_rig, placed_at
 from contact_core.library.fitting import fitted

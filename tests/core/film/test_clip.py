@@ -12,8 +12,8 @@ import contact_core as contact
 from contact_core.cli import main
 from contact_core.document.timeline import CAPTURED, PoseKey
 from contact_core.errors import FileRefused, InvalidInput
+from contact_core.film.clip import read_clips, write_clip
 from contact_core.geometry.transform import transform_points
-from contact_core.job.clip import read_clips, write_clip
 from contact_core.motion.problem import MotionWeights
 from contact_core.proposals.motion import MotionProposal, MotionSettings
 from contact_core.rig.rig import forward_kinematics, skin

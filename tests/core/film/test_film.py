@@ -11,8 +11,8 @@ import pytest
 
 import contact_core as contact
 from contact_core.cli import main
-from contact_core.job.film import picture_at, pictures_of, write_strip
-from contact_core.job.movie import going_round, write_movie
+from contact_core.film.film import picture_at, pictures_of, write_strip
+from contact_core.film.movie import going_round, write_movie
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
 from test_film import ARM, BALL, assets, film  # type: ignore[import-not-found]

@@ -13,7 +13,7 @@ import numpy as np
 
 from contact_core.atomic_file import write_atomic
 from contact_core.errors import InvalidInput
-from contact_core.job.film import pictures_of, renderer_of
+from contact_core.film.film import pictures_of, renderer_of
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.rotations import exponential
 from contact_core.scene.camera import DEFAULT_FROM
