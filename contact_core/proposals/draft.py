@@ -42,7 +42,7 @@ class Draft(DocumentDraft):
     ) -> None:
         super().__init__(document, derived, rigs, makers)
         self.evaluated = dict(evaluated or {})
-        self.patches, self.pairs, self.surfaces = Patches(self), Pairs(self), Surfaces(self)
+        self.patches, self.pairs, self.surfaces = _QuietPatches(self), Pairs(self), Surfaces(self)
 
     def copy(self) -> Draft:
         """Another that goes on from here."""
