@@ -31,8 +31,10 @@ from tests.adapters.viewer.served import CHROMIUM, Page, serving
 from tests.adapters.viewer.viewer_scenes import application
 
 SOURCES = ["sample:human_hand", "sample:mug"]
-FILM = (960, 600)
-COLORS = 160
+WINDOW = (1280, 800)
+FILM = (960, 600)  # of the pictures
+COLORS = 200
+VIVID = 70  # between the channels of a pixel whose colour tells something
 MOST = 3_000_000  # bytes
 STEP = 7  # pixels of the mouse between two pictures of a drag
 CURSOR = """() => {
@@ -63,7 +65,11 @@ class Film:
     def take(self, milliseconds: int = 90, wait: int = 110) -> None:
         """One more picture, once what was done is drawn."""
         self.page.page.wait_for_timeout(wait)
-        shot = Image.open(io.BytesIO(self.page.page.screenshot())).convert("RGB")
+        shot = (
+            Image.open(io.BytesIO(self.page.page.screenshot()))
+            .convert("RGB")
+            .resize(FILM, Image.Resampling.LANCZOS)
+        )
         self.seen.append((shot, milliseconds))
 
     def say(self, words: str, milliseconds: int = 1100) -> None:
@@ -122,10 +128,16 @@ class Film:
 
     def write(self, path: Path) -> None:
         """As a GIF with the colours of the whole film."""
-        whole = Image.new("RGB", (FILM[0], FILM[1] * 12))
-        for k, place in enumerate(np.linspace(0, len(self.seen) - 1, 12).astype(int)):
-            whole.paste(self.seen[place][0], (0, k * FILM[1]))
-        palette = whole.quantize(COLORS)
+        some = [
+            np.asarray(self.seen[k][0]).reshape(-1, 3) for k in np.linspace(0, len(self.seen) - 1, 12).astype(int)
+        ]
+        pixels = np.concatenate(some)
+        vivid = pixels[
+            np.ptp(pixels.astype(int), axis=1) > VIVID
+        ]  # few, and what one looks at: they count as a third
+        pixels = np.concatenate([pixels, np.resize(vivid, (len(pixels) // 2, 3))])
+        rows = len(pixels) // FILM[0]
+        palette = Image.fromarray(pixels[: rows * FILM[0]].reshape(rows, FILM[0], 3)).quantize(COLORS)
         frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image, _ in self.seen]
         durations = [each for _, each in self.seen]
         frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=True)
@@ -209,7 +221,7 @@ def main() -> None:
     out = parser.parse_args().out
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        with page_of(browser, FILM) as (page, app):
+        with page_of(browser, WINDOW) as (page, app):
             film = Film(page, app)
             for step in grasp(film):
                 sys.stdout.write(f"{step}: {len(film.seen)} pictures, {app.line()}\n")

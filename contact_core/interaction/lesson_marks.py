@@ -88,7 +88,7 @@ MARKS: Mapping[str, tuple[Mark, ...]] = {
     "transfer": (
         _across(84.0, 0.054, -20.0),
         _across(90.0, 0.033, -20.0),
-        _across(254.0, 0.090, 16.0),
+        _across(254.0, 0.070, 16.0),
         _across(92.0, 0.085, -20.0),
     ),
 }
