@@ -47,6 +47,7 @@ ACTIONS: tuple[Action, ...] = (
     Action("selection.unlink", "Unlink", ("Shift+K",), "selection", "take the selected patches off their parents"),
     Action("selection.unpair", "Unpair", ("Shift+P",), "selection", "dissolve the pairs of the selected patches"),
     Action("selection.axis", "Default axis", ("Shift+W",), "selection", "lay the axis of the active patch anew"),
+    Action("selection.lock", "Lock", ("Shift+L",), "selection", "no tool changes the selected patches, or unlock"),
     Action("pose.solve", "Solve", ("Space",), "pose", "propose the pose that brings all pairs together"),
     Action("pose.settle", "Settle", ("Shift+Space",), "pose", "propose closer contacts, and the pose"),
     Action("pose.slide", "Slide", ("Ctrl+Space",), "pose", "propose pose and contacts that give way together"),

@@ -12,7 +12,9 @@ import numpy as np
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.document_geometry import DocumentGeometry
+from contact_core.errors import CommandRejected
 from contact_core.interaction.events import Pointer
+from contact_core.interaction.lock import Locks
 from contact_core.interaction.overlay import Handle, handle_under
 from contact_core.interaction.seen import Hit, SeenScene
 from contact_core.interaction.settings import InteractionSettings, Selection
@@ -31,7 +33,7 @@ class Desk:
     """See the module. Tools read everything; of the document they change only what `stroke` previews.
 
     view: of the event that is handled. ghost: a proposal's document, which is shown in place of the session's.
-    hidden: surfaces that the scene does not show: they are neither drawn nor picked.
+    hidden: surfaces that the scene does not show: they are neither drawn nor picked. locks: what no tool changes.
     pins: terms that pull on hands while a gesture lasts: the pose that follows is the edit. Such a term names its
     `bodies`. held: joints that do not follow meanwhile. settled: whether the gesture itself has posed the
     hand, so that no solve follows it. remark: what is worth knowing of what a gesture did, for the line of status.
@@ -48,6 +50,7 @@ class Desk:
         self.settled = False
         self.remark = ""
         self.hidden: frozenset[str] = frozenset()
+        self.locks = Locks()
         self._base = self._base_of = session.document
         self._stack: contextlib.ExitStack | None = None
         self._stroke: Stroke | None = None
@@ -171,6 +174,15 @@ class Desk:
         """Show the document of the press again: a drag that came back is nothing."""
         if self._stroke is not None and self._stroke.command is not None:
             self._stroke.cancel()
+
+    def check_locks(self) -> None:
+        """Raises CommandRejected, and shows the document of the press, where the stroke changes what is locked."""
+        if self._stroke is not None and self._stroke.command is not None:
+            try:
+                self.locks.check(self._stroke.document, self._stroke.preview_document)
+            except CommandRejected:
+                self._stroke.cancel()
+                raise
 
     def draft(self) -> Draft:
         """A draft for several verbs, from the document at the press, for `preview`."""

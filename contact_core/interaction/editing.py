@@ -10,6 +10,7 @@ from contact_core.contact.placement import Link
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import Remove, Unpair
 from contact_core.errors import CommandRejected
+from contact_core.interaction.lock import Kind
 from contact_core.interaction.settings import Selection
 
 if TYPE_CHECKING:
@@ -23,28 +24,37 @@ def _chosen(desk: Desk) -> tuple[str, ...]:
     return desk.selection.patches
 
 
+def _free(desk: Desk, *, active: bool = False, reaching: bool = False) -> tuple[str, ...]:
+    """The selected patches, or the active one, to be changed. Raises CommandRejected for a locked one."""
+    names = _chosen(desk)[-1:] if active else _chosen(desk)
+    desk.locks.check_patches(desk.session.document, names, reaching=reaching)
+    return names
+
+
 def remove(desk: Desk) -> None:
     """Remove the selected patches; their children stay."""
-    desk.session.patches.remove(*_chosen(desk))
+    desk.session.patches.remove(*_free(desk))
 
 
 def clear(desk: Desk) -> None:
     """Remove every patch, and so every pair."""
     if not desk.session.document.patches:
         raise CommandRejected("there are no contacts to clear.")
+    desk.locks.check_patches(desk.session.document, desk.session.document.patches)
     desk.session.do(Macro("Clear contacts", (Remove(tuple(desk.session.document.patches), ()),)))
 
 
 def mirror(desk: Desk) -> None:
     """Turn the selected patches into their mirror images."""
-    with desk.session.macro("Mirror " + ", ".join(_chosen(desk))):
-        for patch in _chosen(desk):
+    chosen = _free(desk, reaching=True)
+    with desk.session.macro("Mirror " + ", ".join(chosen)):
+        for patch in chosen:
             desk.session.patches.mirror(patch)
 
 
 def detach(desk: Desk) -> None:
     """Give the active patch a shape of its own."""
-    desk.session.patches.detach(_chosen(desk)[-1])
+    desk.session.patches.detach(_free(desk, active=True)[-1])
 
 
 def unlink(desk: Desk) -> None:
@@ -53,6 +63,7 @@ def unlink(desk: Desk) -> None:
     linked = [name for name in _chosen(desk) if isinstance(document.patch(name).placement, Link)]
     if not linked:
         raise CommandRejected("none of the selected patches is the child of another.")
+    desk.locks.check_patches(document, linked)
     with desk.session.macro("Unlink " + ", ".join(linked)):
         for patch in linked:
             desk.session.patches.unlink(patch)
@@ -70,7 +81,17 @@ def unpair(desk: Desk) -> None:
 
 def default_axis(desk: Desk) -> None:
     """Lay the axis of the active patch anew, by the default generator."""
-    desk.session.patches.set_axis(_chosen(desk)[-1])
+    desk.session.patches.set_axis(_free(desk, active=True, reaching=True)[-1])
+
+
+def lock(desk: Desk) -> None:
+    """Lock the selected patches, or unlock them where all are; without any, the surface that tools work on."""
+    surface = desk.selection.surface
+    kind: Kind = "patch" if desk.selection.patches or surface is None else "surface"
+    names = set(_chosen(desk)) if kind == "patch" or surface is None else {surface}
+    had = desk.locks.patches if kind == "patch" else desk.locks.surfaces
+    for name in names if names <= had else names - had:
+        desk.locks = desk.locks.turned(kind, name)
 
 
 def rest(desk: Desk) -> None:
@@ -110,6 +131,7 @@ EDITS: Mapping[str, Callable[[Desk], None]] = {
     "selection.unlink": unlink,
     "selection.unpair": unpair,
     "selection.axis": default_axis,
+    "selection.lock": lock,
     "selection.surface": other_surface,
     "selection.none": select_nothing,
     "selection.all": select_all,

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from contact_core.document.document import named
 from contact_core.errors import ContactError, InvalidInput
 from contact_core.interaction.actions import Action, action_of, actions_of
 from contact_core.interaction.desk import Desk
@@ -22,6 +23,7 @@ from contact_core.interaction.editing import EDITS
 from contact_core.interaction.events import Event, Key, Pointer
 from contact_core.interaction.film import FilmDesk
 from contact_core.interaction.live import LiveSolve, prepare
+from contact_core.interaction.lock import Kind
 from contact_core.interaction.overlay import NOTHING, Overlay
 from contact_core.interaction.proposing import Proposing
 from contact_core.interaction.radius import RadiusGesture
@@ -123,6 +125,13 @@ class Interaction:
         self.desk.selection = replace(self.desk.selection, patches=patches,
                                       surface=surface or self.desk.selection.surface)  # fmt: skip
         self._touch("selection", "overlay", "status", "visibility")
+
+    def turn_lock(self, kind: Kind, name: str) -> None:
+        """Lock a surface's patches or a patch against tools, or unlock. Raises CommandRejected."""
+        document = self.desk.document
+        named(document.surfaces if kind == "surface" else document.patches, name, kind)
+        self.desk.locks = self.desk.locks.turned(kind, name)
+        self._touch("visibility", "status")
 
     def opacity(self, surface: str) -> float:
         """How a front end draws a surface: 1 solid, 0 not at all, between them as a ghost."""
@@ -255,6 +264,7 @@ class Interaction:
         """Every event is the gesture's while it lasts: a camera that moved meanwhile would move what is dragged."""
         if event.kind == "move":
             gesture.move(event)
+            self.desk.check_locks()
             self._refusal = ""
             self._touch("overlay", "status")
         elif event.kind == "press" and event.button == "right":
@@ -271,6 +281,7 @@ class Interaction:
         selection = self.desk.selection
         try:
             gesture.release(event)
+            self.desk.check_locks()
             if live is not None:
                 live.finish()
         except ContactError:

@@ -153,10 +153,11 @@ class Proposing:
     def show(self, proposal: Proposal) -> None:
         """Show a proposal in place of the document, until it is accepted or dismissed.
 
-        Raises CommandRejected where the document has changed since it was begun.
+        Raises CommandRejected where the document has changed since it was begun, or where a locked patch moves.
         """
         if proposal.revision != self._desk.session.revision:
             raise CommandRejected("the document has changed since this was begun: solve again.")
+        self._desk.locks.check(self._desk.session.document, proposal.ghost)
         self.proposal, self._desk.ghost = proposal, proposal.ghost
         self._desk.session.show_ghost(proposal)
 
@@ -165,6 +166,7 @@ class Proposing:
         proposal = self.proposal
         if proposal is None:
             raise CommandRejected("nothing is proposed: solve first.")
+        self._desk.locks.check(self._desk.session.document, proposal.ghost)
         self._stop_looking()
         self.forget()
         self._desk.session.accept(proposal)

@@ -103,6 +103,7 @@ def tree(
                 "depth": depth,
                 "color": hexed(patch.color),
                 "hidden": name in hidden_patches,
+                "locked": interaction.desk.locks.holds(patch),
                 "pair": partner.get(name, ""),
                 "gap": "" if meet is None else spelt_length(meet.gap),
                 "level": -1 if meet is None else meet.level,
@@ -123,6 +124,7 @@ def tree(
                 "depth": 0,
                 "rig": surface.rig or "",
                 "hidden": surface.name in hidden_surfaces,
+                "locked": surface.name in interaction.desk.locks.surfaces,
                 "selected": surface.name == selection.surface,
                 "loaded": surface.digest in session.derived.known_meshes,
             }

@@ -1,4 +1,4 @@
-"""What the rows of the tree do: select, hide, rename, colour."""
+"""What the rows of the tree do: select, hide, lock, rename, colour."""
 
 from __future__ import annotations
 
@@ -32,6 +32,10 @@ class TreeActions:
         hidden.symmetric_difference_update({name})
         self.drawer.stale = True
 
+    def lock(self, kind: str, name: str) -> None:
+        """Lock a surface's patches or a patch against tools, or unlock. Raises CommandRejected."""
+        self.interaction.turn_lock("surface" if kind == "surface" else "patch", name)
+
     def select(self, kind: str, name: str, *, more: bool = False) -> None:
         """Select from the tree: a patch (more: beside those selected), or the surface that tools work on."""
         if kind == "surface":
@@ -50,6 +54,7 @@ class TreeActions:
         """Give a patch another name. Raises ContactError."""
         if name and name != patch:
             self.session.patches.rename(patch, name)
+            self.interaction.desk.locks = self.interaction.desk.locks.renamed(patch, name)
 
     def recolor(self, patch: str, color: str) -> None:
         """Give a patch another colour, "#rrggbb"; its partners follow, so that pairs stay recognisable."""

@@ -133,6 +133,7 @@ class Painting(Gesture):
         self.is_new, self.before = patch is None, desk.selection
         self.pixels, self.shows = [pointer.pixel], tool.shows
         self.pressure = pointer.pressure
+        self._check_locks(patch)
         self.hides = self._screens() if desk.selection.surface is None else ()
         radius = tool.radius_on(desk, hit.surface) / self.seen.scale
         self.field = StrokeField.begun(self.seen.rest, radius)
@@ -143,6 +144,13 @@ class Painting(Gesture):
         self.color = palette if self.is_new else document.patch(self.patch).color
         self._extend(hit.point)
         desk.stroke  # noqa: B018  (a session that cannot be edited refuses here, and not after the stroke)
+
+    def _check_locks(self, patch: str | None) -> None:
+        """Raises CommandRejected before anything is painted that could not be kept."""
+        if patch is None:
+            self.desk.locks.check_surface(self.seen.name)
+        else:
+            self.desk.locks.check_patches(self.desk.document, (patch,))
 
     def _screens(self) -> tuple[Screen, ...]:
         """What stands between the eye and the surface: every other one."""

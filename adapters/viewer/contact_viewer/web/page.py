@@ -250,6 +250,10 @@ def _tree_row(v3: Any, html: Any) -> None:
         v3.VIcon("mdi-link-variant", v_if="row.copies", size="13", style="opacity: .55;",
                  title=("'patches that share its shape: ' + row.copies",))  # fmt: skip
         html.Span("{{ row.gap }}", v_if="row.gap", classes=("'gap level' + row.level",))
+        v3.VIcon("{{ row.locked ? 'mdi-lock-outline' : 'mdi-lock-open-variant-outline' }}", size="15",
+                 style=("row.locked ? 'opacity: .9' : 'opacity: .3'",),
+                 title=("row.locked ? 'Unlock: tools may change it again' : 'Lock: no tool changes it'",),
+                 click="$event.stopPropagation(); trigger('lock', [row.kind, row.name])")  # fmt: skip
         v3.VIcon("{{ row.hidden ? 'mdi-eye-off-outline' : 'mdi-eye-outline' }}", size="16",
                  style=("row.hidden ? 'opacity: .9' : 'opacity: .4'",),
                  click="$event.stopPropagation(); trigger('hide', [row.kind, row.name])")  # fmt: skip

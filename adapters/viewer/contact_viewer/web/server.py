@@ -178,6 +178,7 @@ class WebApplication:
         told("act")(self._act)
         told("choose")(lambda kind, name, more: app.select(kind, name, more=bool(more)))
         told("hide")(app.hide)
+        told("lock")(app.lock)
         told("rename")(lambda patch, name: app.rename(str(patch), str(name).strip()))
         told("recolor")(lambda patch, color: app.recolor(str(patch), str(color)))
         told("set")(lambda slot, name, item, value: panel.set_setting(app.interaction, slot, name, item, value))
