@@ -20,7 +20,7 @@ import numpy as np
 
 from contact_core.errors import ContactError
 from contact_core.grasp_files.grasp import HAND, OBJECT, prepare, sheet
-from contact_core.grasping.suggest import GraspSettings
+from contact_core.grasping.searching import GraspSettings
 from contact_core.grasping.suggest import suggest as suggested
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.plugins.manager import PluginManager

@@ -44,7 +44,7 @@ class Grasp:
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.cli.library import library_of
         from contact_core.grasp_files.grasp import grasp
-        from contact_core.grasping.suggest import GraspSettings
+        from contact_core.grasping.searching import GraspSettings
 
         like = None
         if arguments.like is not None:

@@ -22,8 +22,11 @@ from contact_core.document.schema import dump_document
 from contact_core.edit.command import apply_command
 from contact_core.errors import Cancelled, ContactError, InvalidInput
 from contact_core.geometry.transform import transform_points
+from contact_core.grasping.finishing import Suggestion
 from contact_core.grasping.pads import remark_on_size
-from contact_core.grasping.suggest import GraspScene, GraspSettings, Suggestion, suggest
+from contact_core.grasping.scene import GraspScene
+from contact_core.grasping.searching import GraspSettings
+from contact_core.grasping.suggest import suggest
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.grasping.verdict import DEFINITIONS, spell
 from contact_core.hands.description import HandWords

@@ -12,7 +12,7 @@ from contact_core.atomic_file import read_bounded
 from contact_core.document.schema import MAX_BYTES, parse_document
 from contact_core.errors import Cancelled, FileRefused, InvalidInput
 from contact_core.grasp_files.grasp import HAND, OBJECT, GraspResult, prepare, write_results
-from contact_core.grasping.suggest import GraspSettings
+from contact_core.grasping.searching import GraspSettings
 from contact_core.library.shelf import Library
 from contact_core.library.verbs import apply_grasp, library_scene, save_grasp
 from contact_core.opening import DOCUMENT_SUFFIX

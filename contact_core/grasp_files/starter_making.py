@@ -21,9 +21,10 @@ from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
 from contact_core.grasp_files.starter import FINGERS, GraspType, starter_types
 from contact_core.grasping.closing import close_hands
+from contact_core.grasping.finishing import Suggestion, finished
 from contact_core.grasping.hand import STRETCH_PRICE, STRETCHED, Hand, stretches, turn_about
 from contact_core.grasping.pads import disk
-from contact_core.grasping.suggest import GraspScene, Suggestion, finished
+from contact_core.grasping.scene import GraspScene
 from contact_core.hands.description import Pad
 from contact_core.library.capture import bone_ends, captured
 from contact_core.library.carrying import palm_in_rig, placed_at

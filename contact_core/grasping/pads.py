@@ -15,7 +15,7 @@ from contact_core.proposals.draft import Draft
 
 if TYPE_CHECKING:
     from contact_core.geometry.mesh import TriangleMesh
-    from contact_core.grasping.suggest import GraspScene
+    from contact_core.grasping.scene import GraspScene
 
 POINTS, PALM_POINTS = 40, 100
 PLACES, NARROWER = 48, 30  # of the object that are looked at, and the percentile of how wide it is there

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contact_core.arrays import FloatArray
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.transform import transform_points
@@ -25,8 +26,23 @@ def posed_scene(
     hand, thing: surfaces in the same units. length: of the manipulator. solids: whose inside counts for depth, by
     default the object's own.
     """
-    mesh, pose = geometry.mesh(thing), geometry.document.poses[hand]
-    into = geometry.surface_from_surface(thing, hand)
+    into, mesh = geometry.surface_from_surface(thing, hand), geometry.mesh(thing)
+    return posed_scene_in(geometry, rig, hand, thing, into, mesh, length, solids)
+
+
+def posed_scene_in(
+    geometry: DocumentGeometry,
+    rig: Rig,
+    hand: str,
+    thing: str,
+    into: FloatArray,
+    mesh: TriangleMesh,
+    length: float,
+    solids: tuple[TriangleMesh, ...] | None = None,
+) -> PosedScene:
+    """`posed_scene` where the two have other units. into: (4, 4) the space that is looked at from the rig's; mesh:
+    the object there."""
+    pose = geometry.document.poses[hand]
     return PosedScene(
         rest=rig.surface,
         skin=rig.surface.with_points(transform_points(into, posed_points(rig, pose))),

@@ -10,8 +10,10 @@ from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.verbs import ProposingSession
 
 if TYPE_CHECKING:
+    from contact_core.grasping.finishing import Suggestion
+    from contact_core.grasping.scene import GraspScene
+    from contact_core.grasping.searching import GraspSettings
     from contact_core.grasping.slots import Kind
-    from contact_core.grasping.suggest import GraspScene, GraspSettings, Suggestion
     from contact_core.hands.description import HandWords
 
 
@@ -39,7 +41,8 @@ class GraspingSession(ProposingSession):
         first is taken. settings: all of that and more in one value. Nothing is committed. Raises InvalidInput
         where the surface has no hand, or comes near the object nowhere; Cancelled.
         """
-        from contact_core.grasping.suggest import GraspSettings, suggest
+        from contact_core.grasping.searching import GraspSettings
+        from contact_core.grasping.suggest import suggest
 
         chosen = settings or GraspSettings(count, tuple(kinds), at, seed)
         for found in suggest(grasp_scene(self, hand, thing, words), chosen, progress):
@@ -57,7 +60,7 @@ def grasp_scene_of(
 ) -> Callable[[], GraspScene]:
     """`grasp_scene` in two: the scene is read now, the hand looked at in the call, which may be on any thread."""
     from contact_core.grasping.hand import hand_of
-    from contact_core.grasping.suggest import GraspScene
+    from contact_core.grasping.scene import GraspScene
     from contact_core.hands.describe import describe_hand
 
     for name in (hand, thing):

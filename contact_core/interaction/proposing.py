@@ -17,7 +17,7 @@ from contact_core.scene.problem import Objective
 from contact_core.solve.terms import paper_terms
 
 if TYPE_CHECKING:
-    from contact_core.grasping.suggest import Suggestion
+    from contact_core.grasping.finishing import Suggestion
     from contact_core.interaction.desk import Desk
     from contact_core.proposals.proposal import Proposal, SolveSettings
 
@@ -81,7 +81,8 @@ class Proposing:
     def suggest(self) -> None:
         """Begin to look for grasps of the selected object by the selected hand, or of the only ones; the first is
         shown when it comes. Raises CommandRejected where it is not clear which are meant, InvalidInput."""
-        from contact_core.grasping.suggest import GraspSettings, suggest
+        from contact_core.grasping.searching import GraspSettings
+        from contact_core.grasping.suggest import suggest
         from contact_core.grasping.verbs import grasp_scene_of
 
         desk, plugins = self._desk, self._desk.session.plugins

@@ -18,7 +18,8 @@ from contact_core.errors import ContactError, InvalidInput
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.geometry.tracing import trace_geodesic
-from contact_core.grasping.suggest import GraspScene, Suggestion, finished, judged
+from contact_core.grasping.finishing import Suggestion, finished, judged
+from contact_core.grasping.scene import GraspScene
 from contact_core.hands.description import Digit
 from contact_core.library.capture import bone_ends, meters, pairs_between
 from contact_core.library.carrying import (

@@ -24,8 +24,8 @@ from contact_core.scene.problem import world_from_surface
 
 if TYPE_CHECKING:
     from contact_core.geometry.surface_point import SurfacePoints
+    from contact_core.grasping.scene import GraspScene
     from contact_core.grasping.slots import Kind
-    from contact_core.grasping.suggest import GraspScene
     from contact_core.hands.description import Digit
 
 

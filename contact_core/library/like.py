@@ -9,7 +9,10 @@ import numpy as np
 
 from contact_core.document.library import ContactSet
 from contact_core.errors import InvalidInput
-from contact_core.grasping.suggest import GraspScene, GraspSettings, Suggestion, suggest
+from contact_core.grasping.finishing import Suggestion
+from contact_core.grasping.scene import GraspScene
+from contact_core.grasping.searching import GraspSettings
+from contact_core.grasping.suggest import suggest
 from contact_core.library.applying import apply
 from contact_core.library.record import Grasp
 from contact_core.progress import NO_PROGRESS, Progress

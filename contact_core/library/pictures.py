@@ -23,7 +23,7 @@ from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.scene.problem import world_from_surface
 
 if TYPE_CHECKING:
-    from contact_core.grasping.suggest import GraspScene
+    from contact_core.grasping.scene import GraspScene
     from contact_core.plugins.manager import PluginManager
 
 SIZE = (360, 320)  # pixels

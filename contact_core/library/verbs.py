@@ -23,8 +23,8 @@ from contact_core.library.shelf import Library
 from contact_core.progress import NO_PROGRESS, Progress
 
 if TYPE_CHECKING:
+    from contact_core.grasping.scene import GraspScene
     from contact_core.grasping.slots import Kind
-    from contact_core.grasping.suggest import GraspScene
     from contact_core.hands.description import HandWords
     from contact_core.proposals.verbs import ProposingSession
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from contact_core.cli import main
 from contact_core.cli.numbers import finite
 from contact_core.errors import InvalidInput
-from contact_core.grasping.suggest import GraspSettings
+from contact_core.grasping.searching import GraspSettings
 
 HAND_AND_BALL = ["grasp", "sample:human_hand", "sample:baseball"]
 

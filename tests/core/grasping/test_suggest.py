@@ -13,9 +13,11 @@ from contact_core.cli import main
 from contact_core.document.schema import parse_document as load_document
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.grasp_files.grasp import HAND, OBJECT, grasp, prepare
+from contact_core.grasping.finishing import Suggestion
 from contact_core.grasping.pads import remark_on_size
+from contact_core.grasping.searching import GraspSettings
 from contact_core.grasping.slots import lacks
-from contact_core.grasping.suggest import GraspSettings, Suggestion, suggest
+from contact_core.grasping.suggest import suggest
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import CallbackProgress

@@ -8,7 +8,7 @@ import pytest
 
 from contact_core.document.library import ContactSet
 from contact_core.grasp_files.grasp import HAND, OBJECT, prepare
-from contact_core.grasping.suggest import GraspSettings
+from contact_core.grasping.searching import GraspSettings
 from contact_core.library.capture import captured
 from contact_core.library.record import Grasp
 from contact_core.library.verbs import library_scene
