@@ -61,6 +61,7 @@ ACTIONS: tuple[Action, ...] = (
     Action("film.onion", "Onion skin", ("O",), "film", "ghosts of the pose before and after the frame"),
     Action("show.xray", "See through", ("X",), "show", "see through the surface that tools do not work on"),
     Action("show.isolate", "Isolate", ("I",), "show", "show only the surface that tools work on"),
+    Action("show.heat", "Heat map", ("Shift+H",), "show", "colour the skin by its distance and depth"),
     Action("show.help", "Keys", ("?", "Shift+?"), "show", "this table", by_host=True),
     Action("show.tutorial", "Tutorial", ("F1",), "show", "begin the guided tutorial, or end it", by_host=True),
     Action("show.card", "Next card", ("F2",), "show", "go on with the tutorial", by_host=True),

@@ -22,6 +22,7 @@ from contact_core.interaction.drawing import DocumentDrawing
 from contact_core.interaction.editing import EDITS
 from contact_core.interaction.events import Event, Key, Pointer
 from contact_core.interaction.film import FilmDesk
+from contact_core.interaction.heat import HeatMap
 from contact_core.interaction.live import LiveSolve, prepare
 from contact_core.interaction.lock import Kind
 from contact_core.interaction.overlay import NOTHING, Overlay
@@ -54,6 +55,7 @@ class Interaction:
         self.worker = Worker()
         self.proposing = Proposing(self.desk, self.worker)
         self.film = FilmDesk(self.desk)
+        self._heat = HeatMap(self.desk)
         self._drawing = DocumentDrawing(self.desk)
         self._gesture: Gesture | None = None
         self._button = "none"
@@ -357,7 +359,13 @@ class Interaction:
             "film.onion": lambda: self.show_onion(0 if self.film.onion else 3),
             "show.xray": lambda: self.set(xray=not settings.xray),
             "show.isolate": lambda: self.set(isolate=not settings.isolate),
+            "show.heat": self._turn_heat,
         }
+
+    def _turn_heat(self) -> None:
+        if not self.settings.heat:
+            self._heat.check()
+        self.set(heat=not self.settings.heat)
 
     def _show_frame(self, frame: float) -> None:
         self.film.playback.stop()
@@ -399,6 +407,9 @@ class Interaction:
         """All that is drawn over the scene now."""
         own = self._hover if self._gesture is None else self._gesture.overlay()
         behind = self._drawing.overlay().joined(self.film.overlay())
+        if self.settings.heat:
+            moving = self.is_busy or self.film.playback.is_playing
+            behind = behind.joined(self._heat.overlay(fresh=not moving))
         return behind.joined(self.proposing.overlay()).joined(own)
 
     def changes(self) -> Changes:

@@ -119,6 +119,16 @@ class StrokeTint:
 
 
 @dataclass(frozen=True, eq=False)
+class SkinHeat:
+    """How far a skin is from what it may touch. distances: (n,) per vertex, metres, depth below zero. colors:
+    (n, 3) of the same vertices, to be drawn in place of the surface's own."""
+
+    surface: str
+    distances: FloatArray
+    colors: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Overlay:
     """Everything that is drawn over the scene. tint: while a stroke is painted."""
 
@@ -129,6 +139,7 @@ class Overlay:
     rings: tuple[BrushRing, ...] = ()
     ghosts: tuple[Ghost, ...] = ()
     labels: tuple[Label, ...] = ()
+    heats: tuple[SkinHeat, ...] = ()
     tint: StrokeTint | None = None
 
     def joined(self, other: Overlay) -> Overlay:

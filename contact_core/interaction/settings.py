@@ -29,6 +29,7 @@ class InteractionSettings(HasSettings):
     suggestions: int = setting(4, low=1, high=64, help="how many grasps Suggest looks for")
     xray: bool = setting(False, help="see through the surface that tools do not work on")
     isolate: bool = setting(False, help="show only the surface that tools work on")
+    heat: bool = setting(False, help="colour the skin by how far it is from the object, or how deep in it")
     handle_gap: float = setting(20.0, low=4.0, unit="pixels", help="how far handles on an axis stay apart")
     labels: bool = setting(True, help="names of the selected patches beside them")
 

@@ -92,6 +92,12 @@ class SurfaceActor:
         self._mapper.UseLookupTableScalarRangeOn()
         self._mapper.InterpolateScalarsBeforeMappingOn()  # a sharp rim also across large faces
 
+    def set_colors(self, colors: FloatArray) -> None:
+        """Colour each point by itself (n, 3), until `set_values`."""
+        self._polygons.set_colors(np.concatenate([colors, np.ones((len(colors), 1))], axis=1), of="points")
+        self._mapper.InterpolateScalarsBeforeMappingOff()
+        self._mapper.SetScalarVisibility(True)
+
     def remove(self) -> None:
         """Draw it no more."""
         self._renderer.RemoveActor(self._actor)

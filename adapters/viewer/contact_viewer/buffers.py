@@ -38,15 +38,15 @@ class Polygons:
 
     def set_values(self, values: FloatArray) -> None:
         """One number per point (n,), which a lookup table of the mapper colours."""
-        if self._overwrite("values", values, (len(values),), np.float32):
-            self.data.GetPointData().SetScalars(self._as_vtk("values"))
+        self._overwrite("values", values, (len(values),), np.float32)
+        self.data.GetPointData().SetScalars(self._as_vtk("values"))  # colours may have been in their place
         self.data.GetPointData().GetScalars().Modified()
 
     def set_colors(self, colors: FloatArray, *, of: str) -> None:
         """RGBA 0..1 (k, 4) of its points, or of its cells."""
         where = self.data.GetPointData() if of == "points" else self.data.GetCellData()
-        if self._overwrite("colors", np.round(np.asarray(colors) * 255), (len(colors), 4), np.uint8):
-            where.SetScalars(self._as_vtk("colors"))
+        self._overwrite("colors", np.round(np.asarray(colors) * 255), (len(colors), 4), np.uint8)
+        where.SetScalars(self._as_vtk("colors"))
         where.GetScalars().Modified()
 
     def set_faces(self, triangles: IntArray) -> None:

@@ -8,7 +8,7 @@ are two lights, and edges are smoothed only in the frame that stands still.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from contact_core.interaction.overlay import (
     Ghost,
     Overlay,
     PairLine,
+    SkinHeat,
     StrokeTint,
 )
 from contact_viewer.actors import (
@@ -122,7 +123,7 @@ class Canvas:
             if name not in self._fills:
                 self._fills[name] = FillActor(self._base)
             self._fills[name].show(fill, ratio)
-        self._tint(overlay.tint)
+        self._tint(overlay.tint, {heat.surface: heat for heat in overlay.heats})
         lines = [line for axis in overlay.axes for line in self._axis(axis)]
         seams = [Line(line.points, _SEAM, line.width + 2.0, 0.7) for line in lines]
         pairs = [line for pair in overlay.pair_lines for line in _pair(pair)]
@@ -155,13 +156,15 @@ class Canvas:
         across = np.cross(along, self.eye.direction)
         return np.stack([tip + size * (along + 0.6 * across), tip, tip + size * (along - 0.6 * across)])
 
-    def _tint(self, tint: StrokeTint | None) -> None:
-        """Colour what a stroke has covered."""
+    def _tint(self, tint: StrokeTint | None, heats: Mapping[str, SkinHeat]) -> None:
+        """Colour what a stroke has covered, else each skin by its distances, where they are shown."""
         for name, surface in self._surfaces.items():
-            if tint is None or tint.surface != name:
-                surface.set_values(None)
-            else:
+            if tint is not None and tint.surface == name:
                 surface.set_values(np.minimum(tint.distances, 4 * tint.radius), self._table(tint, surface.color))
+            elif name in heats:
+                surface.set_colors(heats[name].colors)
+            else:
+                surface.set_values(None)
 
     def _table(self, tint: StrokeTint, beyond: Color) -> Any:
         """The colour of a stroke up to its radius, and of the surface beyond."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -89,8 +90,8 @@ class Drawer:
         }
         if not hidden and not away:
             return overlay
-        return Overlay(
-            tuple(d for d in overlay.decals if d.patch not in hidden and d.surface not in away),
-            tuple(axis for axis in overlay.axes if axis.patch not in hidden),
-            overlay.handles, overlay.pair_lines, overlay.rings, overlay.ghosts, overlay.labels, overlay.tint,
-        )  # fmt: skip
+        return replace(
+            overlay,
+            decals=tuple(d for d in overlay.decals if d.patch not in hidden and d.surface not in away),
+            axes=tuple(axis for axis in overlay.axes if axis.patch not in hidden),
+        )

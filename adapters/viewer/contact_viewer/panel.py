@@ -10,6 +10,7 @@ import numpy as np
 
 from contact_core.document.document import ContactDocument
 from contact_core.errors import ContactError, InvalidInput
+from contact_core.interaction.heat import LEGEND
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.seen import SeenScene
 from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, PLACERS, POSE_SOLVERS, POSE_TERMS, TOOLS, Slot
@@ -22,7 +23,7 @@ TILTED, TURNED = 25.0, 50.0  # degrees, likewise
 _SLOTS: Mapping[str, Slot[Any]] = {
     slot.hook: slot for slot in (TOOLS, BRUSHES, AXIS_GENERATORS, PLACERS, POSE_SOLVERS, POSE_TERMS)
 }
-_ELSEWHERE = ("live", "xray", "isolate")  # have buttons of their own
+_ELSEWHERE = ("live", "xray", "isolate", "heat")  # have buttons of their own
 _NAMED = {"brush": BRUSHES, "generator": AXIS_GENERATORS, "solver": POSE_SOLVERS, "placer": PLACERS}
 
 
@@ -261,6 +262,11 @@ def report(meets: list[Residual], document: ContactDocument) -> dict[str, Any]:
     else:
         head = f"All {len(meets)} contacts touch."
     return {"head": head, "rows": rows}
+
+
+def legend() -> list[dict[str, str]]:
+    """The colours of the heat map with what they mean."""
+    return [{"color": hexed(stop.color), "text": stop.text} for stop in LEGEND]
 
 
 def next_step(session: Session, interaction: Interaction) -> str:

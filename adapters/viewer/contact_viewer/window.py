@@ -9,6 +9,7 @@ from typing import Any
 
 from contact_core.errors import FileRefused
 from contact_core.interaction.actions import GROUPS
+from contact_core.interaction.heat import legend_text
 from contact_core.plugins.manager import PluginManager
 from contact_viewer import panel
 from contact_viewer.application import Application
@@ -84,6 +85,7 @@ class Front:
         undo = app.undo_name()
         top = [app.title, head if app.meets else panel.next_step(app.session, app.interaction)]
         top += [f"undo: {undo}"] if undo else []
+        top += [legend_text()] if app.interaction.settings.heat else []
         line = " · ".join(part for part in (app.line(), app.refusal()) if part)
         if app.guide.lesson is not None:
             top = [wrapped(app.guide.text())]

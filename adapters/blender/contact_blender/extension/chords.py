@@ -33,7 +33,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
 }
 # Blender does these, beside what the table leaves to the front end.
 _BLENDERS = frozenset(
-    ("edit.undo", "edit.redo", "show.xray", "show.isolate", "film.play", "film.first", "tool.place")
+    ("edit.undo", "edit.redo", "show.xray", "show.isolate", "show.heat", "film.play", "film.first", "tool.place")
 )
 _OURS = frozenset(("pose.key",))  # left to the front end by the table, and done by us
 WHILE_PROPOSED = frozenset(("edit.cancel", "edit.accept", "pose.another", "pose.before"))  # keys of that operator

@@ -16,7 +16,7 @@ import bpy
 
 _GROUP = bpy.types.PropertyGroup
 _OPEN = "AUTO"  # of a choice that may be left open
-LEFT_OUT = frozenset(("xray", "isolate"))  # Blender's own shading and local view do this
+LEFT_OUT = frozenset(("xray", "isolate", "heat"))  # Blender's own shading and local view do this
 Plain = Mapping[str, Any]
 
 

@@ -53,6 +53,10 @@ def build(server: Any, stream_name: str) -> None:
                     name=stream_name, display="image", send_mouse_move=True, event_throttle_ms=8,
                     style="width: 100%; height: 100%;",
                 )  # fmt: skip
+                with html.Div(v_if=("heat",), classes="contact-legend"):
+                    with html.Div(v_for="stop in legend", key=("stop.text",)):
+                        html.Span(classes="contact-mark", style=("'background: ' + stop.color",))
+                        html.Span("{{ stop.text }}")
                 html.Div("{{ next_step }}", v_if=("next_step",), classes="contact-empty")
                 with html.Div(classes="contact-line"):
                     html.Div("{{ line }}", classes="contact-chip")
@@ -132,6 +136,7 @@ def _top(v3: Any, html: Any) -> None:
                 "The hand follows while contacts are dragged (V)",
             ),
             ("xray", "mdi-eye-circle-outline", "X-ray", "show.xray", "See through the other surfaces (X)"),
+            ("heat", "mdi-thermometer", "Heat", "show.heat", "Colour the skin by distance and depth (Shift+H)"),
             ("isolate", "mdi-crop-free", "Isolate", "show.isolate", "Show only the surface in hand (I)"),
         ):
             v3.VBtn(

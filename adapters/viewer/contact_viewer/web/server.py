@@ -287,6 +287,7 @@ class WebApplication:
             told["settings"] = panel.settings(app.interaction)
             settings = app.interaction.settings
             told |= {"live": settings.live, "xray": settings.xray, "isolate": settings.isolate}
+            told |= {"heat": settings.heat, "legend": panel.legend() if settings.heat else []}
         if everything:
             told["help_groups"] = self._help()
         with state:
