@@ -11,37 +11,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from contact_core.document.document import named
 from contact_core.errors import ContactError, InvalidInput
-from contact_core.interaction.actions import Action, action_of, actions_of
-from contact_core.interaction.desk import Desk
+from contact_core.interaction.actions import action_of
 from contact_core.interaction.drawing import DocumentDrawing
 from contact_core.interaction.editing import EDITS
 from contact_core.interaction.events import Event, Key, Pointer
 from contact_core.interaction.film import FilmDesk
 from contact_core.interaction.heat import HeatMap
+from contact_core.interaction.holding import Holding
 from contact_core.interaction.live import LiveSolve, prepare
-from contact_core.interaction.lock import Kind
 from contact_core.interaction.overlay import NOTHING, Overlay
 from contact_core.interaction.proposing import Proposing
 from contact_core.interaction.radius import RadiusGesture
-from contact_core.interaction.settings import InteractionSettings, Selection
-from contact_core.interaction.status import Changes, Part, Status
-from contact_core.interaction.tool import Gesture, Tool
-from contact_core.interaction.view import Perspective, View
+from contact_core.interaction.status import Changes, Status
+from contact_core.interaction.tool import Gesture
+from contact_core.interaction.view import View
 from contact_core.interaction.work import Worker
-from contact_core.plugins.registry import TOOLS, Slot
-from contact_core.settings import configured
 
 if TYPE_CHECKING:
     from contact_core.edit.listeners import DocumentChanged
     from contact_core.session import Session
 
 
-class Interaction:
+class Interaction(Holding):
     """One artist at one session, in one or several views. It is for the session's thread.
 
     session: what is edited. meters_per_unit: of the world that views look at. A tool is in the hand from the start:
@@ -49,9 +43,7 @@ class Interaction:
     """
 
     def __init__(self, session: Session, *, meters_per_unit: float = 1.0) -> None:
-        nowhere = Perspective.looking_at((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-        self.session = session
-        self.desk = Desk(session, nowhere, meters_per_unit=meters_per_unit)
+        super().__init__(session, meters_per_unit)
         self.worker = Worker()
         self.proposing = Proposing(self.desk, self.worker)
         self.film = FilmDesk(self.desk)
@@ -64,9 +56,6 @@ class Interaction:
         self._hover: Overlay = NOTHING
         self._refusal = ""
         self._moved: set[str] = set(self.desk.scene.surfaces)
-        self._parts: set[Part] = {"document", "overlay", "selection", "tool", "settings", "status", "visibility"}
-        offered = list(session.plugins.offers(TOOLS))
-        self._tool = "select" if "select" in offered else (offered or [""])[0]
         self._stop_listening = session.listen(self._follow)
 
     def close(self) -> None:
@@ -78,69 +67,12 @@ class Interaction:
 
     # -- what is in the hand ---------------------------------------------------------------------------------
 
-    @property
-    def tools(self) -> tuple[Tool, ...]:
-        """All tools, with their settings."""
-        return tuple(self.desk.tool(name) for name in self.session.plugins.offers(TOOLS))
-
-    @property
-    def tool(self) -> str:
-        """The name of the tool in the hand, "" where no tool is offered."""
-        return self._tool
-
     def take_up(self, name: str) -> None:
         """Take up a tool; a gesture under way is put back. Raises InvalidInput for a name that is not offered."""
         self.desk.tool(name)
         self.cancel()
         self._tool, self._hover = name, NOTHING
         self._touch("tool", "overlay", "status")
-
-    @property
-    def settings(self) -> InteractionSettings:
-        """What holds for all tools."""
-        return self.desk.settings
-
-    def set(self, **values: Any) -> None:
-        """Set some of `settings` by name. Raises InvalidInput."""
-        self.desk.settings = configured(self.desk.settings, values, "the interaction")
-        self._touch("settings", "overlay", "status", "visibility")
-
-    def configure(self, slot: Slot[Any], name: str, **values: Any) -> None:
-        """Set settings of a tool, a brush, an axis generator, a solver or a term by name. Raises InvalidInput."""
-        self.desk.configure(slot, name, **values)
-        self._touch("settings", "overlay", "status")
-
-    @property
-    def selection(self) -> Selection:
-        """What is selected."""
-        return self.desk.selection
-
-    def select(self, *patches: str, surface: str | None = None) -> None:
-        """Select patches, the active one last, and the surface that tools work on; by default that stays.
-
-        Raises CommandRejected for a name that the document does not have.
-        """
-        for name in patches:
-            self.desk.document.patch(name)
-        if surface is not None:
-            self.desk.document.surface(surface)
-        self.desk.selection = replace(self.desk.selection, patches=patches,
-                                      surface=surface or self.desk.selection.surface)  # fmt: skip
-        self._touch("selection", "overlay", "status", "visibility")
-
-    def turn_lock(self, kind: Kind, name: str) -> None:
-        """Lock a surface's patches or a patch against tools, or unlock. Raises CommandRejected."""
-        document = self.desk.document
-        named(document.surfaces if kind == "surface" else document.patches, name, kind)
-        self.desk.locks = self.desk.locks.turned(kind, name)
-        self._touch("visibility", "status")
-
-    def opacity(self, surface: str) -> float:
-        """How a front end draws a surface: 1 solid, 0 not at all, between them as a ghost."""
-        mine = self.desk.selection.surface
-        if mine is None or surface == mine:
-            return 1.0
-        return 0.0 if self.settings.isolate else 0.35 if self.settings.xray else 1.0
 
     # -- events ----------------------------------------------------------------------------------------------
 
@@ -305,11 +237,6 @@ class Interaction:
 
     # -- keys ------------------------------------------------------------------------------------------------
 
-    @property
-    def actions(self) -> tuple[Action, ...]:
-        """The table of actions and keys, tools among them."""
-        return actions_of(self.tools)
-
     def _key(self, key: Key) -> bool:
         action = action_of(key, self.actions)
         if action is None or action.by_host:
@@ -391,13 +318,6 @@ class Interaction:
             self.proposing.dismiss()
         self._touch("overlay", "status", "work", "film")
 
-    def resize(self, factor: float) -> None:
-        """Make the radius of the tool in the hand larger by a factor. Raises InvalidInput where it has none."""
-        resized = getattr(self.desk.tool(self._tool), "resized", None)
-        if resized is None:
-            raise InvalidInput(f"the tool {self._tool!r} has no radius.")
-        self.configure(TOOLS, self._tool, radius=resized(self.desk, factor))
-
     def _begin_radius(self) -> None:
         self._begin(RadiusGesture(self), "none")
 
@@ -442,18 +362,6 @@ class Interaction:
         self._moved |= moved
         self._touch("document", "overlay", "film")
 
-    def _keep_selection(self) -> None:
-        """Only what there is can be selected."""
-        document, selection = self.session.document, self.desk.selection
-        patches = tuple(name for name in selection.patches if name in document.patches)
-        surface = selection.surface if selection.surface in document.surfaces else None
-        if (patches, surface) != (selection.patches, selection.surface):
-            self.desk.selection = replace(selection, patches=patches, surface=surface)
-            self._touch("selection", "visibility")
-
     def _refused(self, error: ContactError) -> None:
         self._refusal = str(error)
         self._touch("status")
-
-    def _touch(self, *parts: Part) -> None:
-        self._parts.update(parts)
