@@ -45,6 +45,7 @@ ACTIONS: tuple[Action, ...] = (
     Action("selection.mirror", "Mirror", ("M",), "selection", "turn the selected patches into their mirror images"),
     Action("selection.detach", "Detach", ("Shift+D",), "selection", "give the active patch a shape of its own"),
     Action("selection.unlink", "Unlink", ("Shift+K",), "selection", "take the selected patches off their parents"),
+    Action("selection.pair", "Pair the two", ("Ctrl+P",), "selection", "pair the two selected patches"),
     Action("selection.unpair", "Unpair", ("Shift+P",), "selection", "dissolve the pairs of the selected patches"),
     Action("selection.axis", "Default axis", ("Shift+W",), "selection", "lay the axis of the active patch anew"),
     Action("selection.lock", "Lock", ("Shift+L",), "selection", "no tool changes the selected patches, or unlock"),

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from contact_core.contact.placement import Link
+from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command, Macro
 from contact_core.edit.commands import Remove, Unpair
 from contact_core.errors import CommandRejected
@@ -79,6 +80,24 @@ def unpair(desk: Desk) -> None:
     desk.session.do(Macro("Unpair " + ", ".join(sorted(chosen)), commands))
 
 
+def in_order(document: ContactDocument, first: str, second: str) -> tuple[str, str]:
+    """The patch of the manipulator, then that of the object: what has a rig comes first."""
+    rigged = [document.surface(document.patch(name).surface).rig is not None for name in (first, second)]
+    return (second, first) if rigged == [False, True] else (first, second)
+
+
+def pair(desk: Desk) -> None:
+    """Pair the two selected patches; they stay selected. Raises CommandRejected where two cannot meet."""
+    document, chosen = desk.session.document, _chosen(desk)
+    if len(chosen) != 2:
+        raise CommandRejected(f"two patches make a pair, but got {len(chosen)}: select one on each surface.")
+    if document.patch(chosen[0]).surface == document.patch(chosen[1]).surface:
+        raise CommandRejected("patches of two surfaces are paired, but both are on one: link them instead.")
+    if any({pair.manipulator, pair.object} == set(chosen) for pair in document.pairs.values()):
+        raise CommandRejected("the two are paired already.")
+    desk.session.pairs.add(*in_order(document, *chosen))
+
+
 def default_axis(desk: Desk) -> None:
     """Lay the axis of the active patch anew, by the default generator."""
     desk.session.patches.set_axis(_free(desk, active=True, reaching=True)[-1])
@@ -129,6 +148,7 @@ EDITS: Mapping[str, Callable[[Desk], None]] = {
     "selection.mirror": mirror,
     "selection.detach": detach,
     "selection.unlink": unlink,
+    "selection.pair": pair,
     "selection.unpair": unpair,
     "selection.axis": default_axis,
     "selection.lock": lock,

@@ -9,9 +9,9 @@ import numpy as np
 
 from contact_builtins.tools.drag import patch_under
 from contact_core.contact.placement import Link
-from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected
 from contact_core.interaction.desk import Desk
+from contact_core.interaction.editing import in_order
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import ACCENT, NOTHING, AxisLine, Overlay
 from contact_core.interaction.seen import Hit
@@ -113,12 +113,6 @@ class Pairing(Joining):
         if document.patch(self.first).surface == document.patch(found[0]).surface:
             raise CommandRejected("patches of two surfaces are paired, but both are on one: link them instead.")
         self.desk.stroke.pairs.add(*in_order(document, self.first, found[0]))
-
-
-def in_order(document: ContactDocument, first: str, second: str) -> tuple[str, str]:
-    """The patch of the manipulator, then that of the object: what has a rig comes first."""
-    rigged = [document.surface(document.patch(name).surface).rig is not None for name in (first, second)]
-    return (second, first) if rigged == [False, True] else (first, second)
 
 
 def _anywhere(desk: Desk, pointer: Pointer, but: str | None = None) -> tuple[str, Hit] | None:

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from contact_builtins.tools.drag import Drag, patch_under
-from contact_builtins.tools.join import in_order
 from contact_builtins.tools.move import as_seen, heading_to
 from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Root
@@ -18,6 +17,7 @@ from contact_core.errors import ContactError, NotManifold
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import heading_to_direction
 from contact_core.interaction.desk import Desk
+from contact_core.interaction.editing import in_order
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import NOTHING, Ghost, Overlay
 from contact_core.interaction.seen import Hit

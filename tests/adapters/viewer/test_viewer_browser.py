@@ -266,3 +266,31 @@ def test_keys_in_a_field_of_text_are_text(browser: Any, served: Served) -> None:
     page.until("() => trame.state.get('line').includes('none.glb')")
     assert page.errors == []
     page.page.close()
+
+
+@pytest.mark.slow
+def test_a_lock_in_the_tree_and_the_legend_of_the_heat_map(browser: Any, tmp_path: Path) -> None:
+    """A click on the lock keeps the brush away in a sentence, a second lets it paint; the legend has its units."""
+    with serving(tmp_path, "sample:human_hand", "sample:baseball") as made:
+        page = Page.opened(browser, made.address, size=(1300, 760))
+        page.key("Shift+h")
+        page.page.wait_for_selector(".contact-legend >> text=20 mm away or more", timeout=10_000)
+        page.key("Shift+h")
+        page.until("() => !trame.state.get('heat')")
+        page.page.locator("button:has-text('Heat')").click()
+        page.until("() => trame.state.get('heat')")
+        lock = page.page.locator('.contact-row:has-text("baseball") i[title^="Lock"]')
+        lock.click()
+        page.until("() => trame.state.get('tree').some((row) => row.name === 'baseball' && row.locked)")
+        page.page.locator('.contact-row:has-text("baseball")').click()
+        page.key("b")
+        where = (0.738, 0.72)  # the ball, seen from the front
+        page.drag(where, (where[0] + 0.01, where[1]))
+        page.until("() => trame.state.get('refusal').includes('locked')")
+        page.until_patches(0)
+        page.page.locator('.contact-row:has-text("baseball") i[title^="Unlock"]').click()
+        page.until("() => !trame.state.get('tree').some((row) => row.locked)")
+        page.drag(where, (where[0] + 0.01, where[1]))
+        page.until_patches(1)
+        assert page.errors == []
+        page.page.close()

@@ -29,6 +29,11 @@ ICONS = {
     "measure": "mdi-ruler",
     "weigh": "mdi-weight",
 }
+# two patches are selected that do not meet yet
+_TWO = (
+    "((two) => two.length === 2 && two[0].pair !== two[1].name)"
+    "(tree.filter((row) => row.kind === 'patch' && row.selected))"
+)
 _OTHER_ICON = "mdi-circle-outline"
 
 
@@ -171,6 +176,9 @@ def _right(v3: Any, html: Any) -> None:
             _card(v3, html)
             with html.Div(classes="contact-head"):
                 html.Span("Surfaces and contacts")
+                v3.VBtn("Pair", size="x-small", variant="tonal", color="primary", classes="text-none",
+                        prepend_icon="mdi-handshake-outline", title="Pair the two selected patches (Ctrl+P)",
+                        v_if=(_TWO,), click="trigger('act', ['selection.pair'])")  # fmt: skip
                 html.Span("{{ report.head }}", style="text-transform: none; letter-spacing: 0;",
                           classes=("report.rows.length ? 'level' + report.rows[0].level : ''",))  # fmt: skip
             with html.Div(classes="contact-scroll", style="flex: 1 1 46%; min-height: 120px;"):
