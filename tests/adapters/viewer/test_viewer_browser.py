@@ -294,3 +294,27 @@ def test_a_lock_in_the_tree_and_the_legend_of_the_heat_map(browser: Any, tmp_pat
         page.until_patches(1)
         assert page.errors == []
         page.page.close()
+
+
+@pytest.mark.slow
+def test_two_rows_of_the_tree_are_paired_by_the_button(browser: Any, tmp_path: Path) -> None:
+    """It comes when two patches are selected, and goes once they meet."""
+    with serving(tmp_path, "sample:human_hand", "sample:baseball") as made:
+        page = Page.opened(browser, made.address, size=(1300, 760))
+        page.key("b")
+        page.drag((0.738, 0.72), (0.745, 0.72), (0.74, 0.71))
+        page.until_patches(1)
+        page.drag((0.38, 0.1), (0.375, 0.12), (0.38, 0.11))
+        page.until_patches(2)
+        rows, button = page.page.locator(".contact-row:has(input[type=color])"), "button[title^='Pair the two']"
+        rows.nth(0).click()
+        page.until(
+            "() => trame.state.get('tree').filter((row) => row.kind === 'patch' && row.selected).length === 1"
+        )
+        assert page.page.locator(button).count() == 0
+        rows.nth(1).click(modifiers=["Shift"])
+        page.page.locator(button).click(timeout=10_000)
+        page.until("() => trame.state.get('tree').filter((row) => row.pair).length === 2")
+        page.page.wait_for_selector(button, state="detached", timeout=10_000)
+        assert page.errors == []
+        page.page.close()
