@@ -95,7 +95,7 @@ def test_visibility_holds_for_what_is_below(tmp_path: Path) -> None:
     asset = read(changed(tmp_path, "e02_hidden_node.glb", nodes=nodes))
     assert len(asset.mesh.points) == 110 and "below" in asset.notes[0]
     nodes = [{"extensions": off, "children": [1]}, {"mesh": 0, "name": "below"}]
-    with pytest.raises(FileRefused, match="shows no triangles; hidden are below"):
+    with pytest.raises(FileRefused, match="shows no triangles: hidden are below"):
         read(changed(tmp_path, "e02_hidden_node.glb", nodes=nodes, scenes=[{"nodes": [0]}]))
 
 

@@ -150,7 +150,7 @@ REFUSED = {
     "points only": (
         "m.ply",
         PLY_POINT % b"ascii" + b"end_header\n1 2 3",
-        "only points",
+        "points and no faces",
     ),
     "huge list": (
         "m.ply",

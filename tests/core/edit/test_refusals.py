@@ -194,6 +194,7 @@ READING = {
         "of",
         "mesh",
         "mesh_of",
+        "surface_from_surface",
         "axis",
         "root",
         "reconstruction",
