@@ -137,13 +137,18 @@ class Page:
         self.drag_pixels(*((x * width, y * height) for x, y in path))
 
     def drag_pixels(self, *path: tuple[float, float]) -> None:
-        """The same by pixels of the view; no faster than a hand."""
+        """The same by pixels of the view; no faster than a hand, and never two moves in one frame of the browser, which
+        would make one of them."""
         (left, top), mouse = self.corner(), self.page.mouse
         places = [(left + x, top + y) for x, y in path]
         mouse.move(*places[0])
         mouse.down()
         for place in places[1:]:
-            self.page.wait_for_timeout(30)
+            self._frame()
             mouse.move(*place)
-        self.page.wait_for_timeout(30)
+        self._frame()
         mouse.up()
+
+    def _frame(self) -> None:
+        self.page.wait_for_timeout(30)
+        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
