@@ -131,8 +131,7 @@ def _unfit(scene: GraspScene, solution: PoseSolution) -> dict[str, str]:
 
 def _posed(scene: GraspScene, draft: Draft) -> FloatArray:
     """(n, 3) the hand's skin as a draft has it, in the object's space."""
-    object_from_rig = scene.object_from_world @ world_from_surface(scene.document, scene.hand_name)
-    return transform_points(object_from_rig, posed_points(scene.rig, draft.document.poses[scene.hand_name]))
+    return transform_points(scene.object_from_rig, posed_points(scene.rig, draft.document.poses[scene.hand_name]))
 
 
 def _place(scene: GraspScene, draft: Draft, names: tuple[str, ...]) -> dict[str, str]:
@@ -175,7 +174,7 @@ def judged(
     hand, rig = scene.hand, scene.rig
     pose = draft.document.poses[scene.hand_name]
     local = pose_on(rig, pose)
-    object_from_rig = scene.object_from_world @ world_from_surface(scene.document, scene.hand_name)
+    object_from_rig = scene.object_from_rig
     world = object_from_rig @ posed_world(rig, pose)
     looked_at = posed_scene_in(
         draft.geometry, rig, scene.hand_name, scene.object_name, object_from_rig, scene.mesh, hand.length

@@ -67,6 +67,11 @@ class GraspScene:
         world[:3, :3] /= uniform_scale(world)
         return np.asarray(np.linalg.inv(world))
 
+    @cached_property
+    def object_from_rig(self) -> FloatArray:
+        """(4, 4) rigid, from the hand's rig space, where it stands, into the object's in the hand's units."""
+        return self.object_from_world @ world_from_surface(self.document, self.hand_name, self._unit)
+
     @property
     def _unit(self) -> float:
         return self.document.surface(self.hand_name).meters_per_unit

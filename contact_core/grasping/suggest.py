@@ -23,7 +23,6 @@ from contact_core.grasping.slots import Approaches, GraspScore, lacks
 from contact_core.plugins.registry import GRASP_SCORES
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.draft import Draft
-from contact_core.scene.problem import world_from_surface
 
 MOST_TRIED = 3  # times as many as are wanted are solved at most
 REACHED = 0.5  # hand lengths: a place to hold that is farther from the object is none of its
@@ -92,8 +91,7 @@ def _finished(
 ) -> Suggestion | None:
     """A closed hand as a solved document; None where too few pads find a place."""
     hand, draft = scene.hand, base.copy()
-    world = world_from_surface(scene.document, scene.hand_name)
-    in_rig = np.linalg.inv(world) @ np.linalg.inv(scene.object_from_world) @ closed.placed[0]
+    in_rig = np.linalg.inv(scene.object_from_rig) @ closed.placed[0]
     start = hand.pose(in_rig, closed.angles[0], closed.starts[0])
     draft.surfaces.set_pose(scene.hand_name, start)
     wanted = _taking_part(scene, approach, pads)

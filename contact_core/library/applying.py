@@ -38,7 +38,7 @@ from contact_core.plugins.registry import GRASP_SCORES
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.draft import Draft
 from contact_core.rig.rig import Pose
-from contact_core.scene.problem import Objective, world_from_surface
+from contact_core.scene.problem import Objective
 from contact_core.solve.solver import PoseSolution, SolveStatus
 
 THICKER = 0.3, 3.0  # how far the ratio of a digit's thickness goes from that of the hands
@@ -154,7 +154,7 @@ def _units(scene: GraspScene) -> float:
 
 def _in_world(scene: GraspScene, local: FloatArray) -> FloatArray:
     """A pose whose root is in the object's space, with its root in the hand's surface space."""
-    hand_from_object = np.linalg.inv(scene.object_from_world @ world_from_surface(scene.document, scene.hand_name))
+    hand_from_object = np.linalg.inv(scene.object_from_rig)
     result = local.copy()
     roots = scene.rig.parents < 0
     result[roots] = hand_from_object @ result[roots]

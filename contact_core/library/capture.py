@@ -20,7 +20,6 @@ from contact_core.library.places import main_axes, seen_from_palm
 from contact_core.library.record import PALM, Grasp, SavedBone, SavedDigit, SavedHand, SavedObject, SavedPad
 from contact_core.proposals.draft import Draft
 from contact_core.rig.rig import Pose, forward_kinematics, skin
-from contact_core.scene.problem import world_from_surface
 
 if TYPE_CHECKING:
     from contact_core.geometry.surface_point import SurfacePoints
@@ -43,7 +42,7 @@ def captured(
     pose = scene.document.poses.get(scene.hand_name) or Pose.rest(rig)
     local = pose.local[[pose.joints.index(name) for name in rig.joints]]
     own = forward_kinematics(rig.parents, local)
-    object_from_rig = scene.object_from_world @ world_from_surface(scene.document, scene.hand_name)
+    object_from_rig = scene.object_from_rig
     placed = object_from_rig @ palm_in_rig(hand, own)
     names = dict.fromkeys(scene.document.pairs[pair].manipulator for pair in pairs)
     pads = tuple(saved_pad(hand, name, draft.geometry.axis_points(name)) for name in names)

@@ -20,7 +20,6 @@ from contact_core.library.shelf import Entry, Library
 from contact_core.plugins.drawing import draw
 from contact_core.rig.rig import Pose, forward_kinematics, skin
 from contact_core.scene.picture import Picture, PictureMesh
-from contact_core.scene.problem import world_from_surface
 
 if TYPE_CHECKING:
     from contact_core.grasping.scene import GraspScene
@@ -61,7 +60,7 @@ def picture_of(scene: GraspScene, pose: Pose | None = None, caption: str = "") -
     hand, rig = scene.hand, scene.rig
     pose = pose or scene.document.poses.get(scene.hand_name) or Pose.rest(rig)
     own = forward_kinematics(rig.parents, pose.local[[pose.joints.index(name) for name in rig.joints]])
-    object_from_rig = scene.object_from_world @ world_from_surface(scene.document, scene.hand_name)
+    object_from_rig = scene.object_from_rig
     posed = TriangleMesh(transform_points(object_from_rig, skin(rig, own)), rig.faces)
     palm = (object_from_rig @ palm_in_rig(hand, own))[:3, :3]
     digits = posed.points[np.concatenate(hand.skin_of_digits)]

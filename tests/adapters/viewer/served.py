@@ -137,8 +137,8 @@ class Page:
         self.drag_pixels(*((x * width, y * height) for x, y in path))
 
     def drag_pixels(self, *path: tuple[float, float]) -> None:
-        """The same by pixels of the view; no faster than a hand, and never two moves in one frame of the browser, which
-        would make one of them."""
+        """The same by pixels of the view; no faster than a hand, and never two moves in one frame of the browser,
+        which would make one of them."""
         (left, top), mouse = self.corner(), self.page.mouse
         places = [(left + x, top + y) for x, y in path]
         mouse.move(*places[0])

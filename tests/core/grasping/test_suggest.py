@@ -58,6 +58,22 @@ def test_the_same_seed_gives_the_same_grasps(session: Session, found: list[Sugge
     assert np.array_equal(again.skin.points, found[0].skin.points)
 
 
+def test_a_hand_in_centimetres_grasps_as_one_in_metres(session: Session, found: list[Suggestion]) -> None:
+    rig = session.rigs[HAND]
+    local, bind = rig.rest_local.copy(), rig.bind_world.copy()
+    local[:, :3, 3] *= 100.0
+    bind[:, :3, 3] *= 100.0
+    larger = replace(
+        rig, rest_local=local, bind_world=bind, bind_points=100.0 * rig.bind_points, meters_per_unit=0.01
+    )
+    with Session(plugins=session.plugins) as other:
+        other.surfaces.add(HAND, larger.surface, meters_per_unit=0.01, rig=larger)
+        other.surfaces.add(OBJECT, session.geometry.mesh(OBJECT))
+        first = next(iter(other.suggest(HAND, OBJECT, settings=SETTINGS)))
+    assert first.kind == found[0].kind and first.is_grasp, first.verdict.failures
+    assert first.score == pytest.approx(found[0].score, abs=1e-3)
+
+
 def test_who_cancels_gets_nothing_written(tmp_path: Path) -> None:
     def stop(fraction: float | None, text: str) -> None:
         if text.startswith("Solving"):
