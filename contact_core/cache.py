@@ -57,7 +57,7 @@ def cached_arrays(
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(path) as part:
-                np.savez_compressed(part, allow_pickle=False, **arrays, **{_NAMES: np.array(list(arrays))})
+                np.savez_compressed(part, **arrays, **{_NAMES: np.array(list(arrays))})
         except (OSError, FileRefused):
             pass
     return arrays
