@@ -57,7 +57,8 @@ def cached_arrays(
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(path) as part:
-                np.savez_compressed(part, **arrays, **{_NAMES: np.array(list(arrays))})
+                content: dict[str, Any] = {**arrays, _NAMES: np.array(list(arrays))}
+                np.savez_compressed(part, **content)
         except (OSError, FileRefused):
             pass
     return arrays

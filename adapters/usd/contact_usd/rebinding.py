@@ -80,4 +80,4 @@ def keep(path: Path, surfaces: Mapping[str, TriangleMesh]) -> None:
     for number, mesh in enumerate(surfaces.values()):
         arrays |= {f"points{number}": mesh.points, f"faces{number}": mesh.faces}
     with replacing(path) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, **arrays)
+        np.savez_compressed(stream, **arrays)
