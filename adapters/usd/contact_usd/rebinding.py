@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
 from contact_core.atomic_file import replacing
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
@@ -76,7 +76,7 @@ def _read(path: Path) -> Mapping[str, TriangleMesh]:
 
 def keep(path: Path, surfaces: Mapping[str, TriangleMesh]) -> None:
     """Write surfaces for the next `rebind_changed`."""
-    arrays: dict[str, FloatArray | IntArray] = {}
+    arrays: dict[str, Any] = {}
     for number, mesh in enumerate(surfaces.values()):
         arrays |= {f"points{number}": mesh.points, f"faces{number}": mesh.faces}
     with replacing(path) as temporary, temporary.open("wb") as stream:
