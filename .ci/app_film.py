@@ -2,11 +2,10 @@
 
     python .ci/app_film.py [--out FOLDER]
 
-Somebody goes the way of the tutorial (`contact_core.interaction.lesson`) with mouse and keys: paints, draws an axis,
-transfers, sees pairs, drags, solves. Needs a Chromium, playwright and Pillow (extras app, dev).
+Somebody goes the way of the tutorial (`contact_core.interaction.lesson`) with mouse and keys: paints, draws an
+axis, transfers, sees pairs, drags, solves. Needs a Chromium, playwright and Pillow (extras app, dev).
 """
 
-# ruff: noqa: E501
 from __future__ import annotations
 
 import argparse
@@ -39,13 +38,14 @@ MOST = 3_000_000  # bytes
 STEP = 7  # pixels of the mouse between two pictures of a drag
 CURSOR = """() => {
   const cursor = document.createElement('div');
-  cursor.innerHTML = '<svg width="22" height="30" viewBox="0 0 22 30"><path d="M2 2 L2 23 L7.5 18 L11.5 27 L15 25.5 ' +
-    'L11 16.8 L18.5 16.5 Z" fill="white" stroke="black" stroke-width="1.6"/></svg>';
+  cursor.innerHTML = '<svg width="22" height="30" viewBox="0 0 22 30"><path d="M2 2 L2 23 L7.5 18 L11.5 27 ' +
+    'L15 25.5 L11 16.8 L18.5 16.5 Z" fill="white" stroke="black" stroke-width="1.6"/></svg>';
   cursor.style.cssText = 'position:fixed;left:-50px;top:-50px;z-index:99999;pointer-events:none';
   const told = document.createElement('div');
   told.id = 'film-keys';
-  told.style.cssText = 'position:fixed;left:34%;top:60px;white-space:nowrap;transform:translateX(-50%);z-index:99998;pointer-events:none;' +
-    'font:600 20px sans-serif;color:white;background:rgba(15,17,21,.82);border-radius:8px;padding:8px 16px;display:none';
+  told.style.cssText = 'position:fixed;left:34%;top:60px;white-space:nowrap;transform:translateX(-50%);' +
+    'z-index:99998;pointer-events:none;font:600 20px sans-serif;color:white;background:rgba(15,17,21,.82);' +
+    'border-radius:8px;padding:8px 16px;display:none';
   document.body.append(cursor, told);
   window.addEventListener('mousemove', (event) => {
     cursor.style.left = (event.clientX - 2) + 'px'; cursor.style.top = (event.clientY - 2) + 'px';
@@ -55,8 +55,8 @@ CURSOR = """() => {
 
 @dataclass
 class Film:
-    """Pictures of a page, with how long each is seen (ms). The application beside it, `app`, gets every event too, and
-    knows where things are."""
+    """Pictures of a page, with how long each is seen (ms). The application beside it, `app`, gets every event
+    too, and knows where things are."""
 
     page: Page
     app: Any
@@ -81,7 +81,8 @@ class Film:
 
     def key(self, chord: str) -> None:
         *held, name = chord.split("+")
-        self.app.handle(Key(name, frozenset(each.lower() for each in held)))  # type: ignore[misc]
+        modifiers: Any = frozenset(each.lower() for each in held)
+        self.app.handle(Key(name, modifiers))
         self.app.frame()
         plain = name.lower() if len(name) == 1 else name
         self.page.key("+".join([*(each.replace("Ctrl", "Control") for each in held), plain]))
@@ -93,11 +94,12 @@ class Film:
             steps = max(1, round(float(np.linalg.norm(pixel - path[-1])) / STEP))
             path += [np.floor(path[-1] + (pixel - path[-1]) * k / steps) for k in range(1, steps + 1)]
         left, top = self.page.corner()
-        mouse, modifiers = self.page.page.mouse, frozenset({held} - {""})
+        mouse = self.page.page.mouse
+        modifiers: Any = frozenset({held} - {""})
 
         def both(kind: Any, pixel: Any) -> None:
             pressed: Any = button if kind != "move" else "none"
-            self.app.handle(Pointer(kind, pixel[0] + 0.5, pixel[1] + 0.5, pressed, modifiers))  # type: ignore[arg-type]
+            self.app.handle(Pointer(kind, pixel[0] + 0.5, pixel[1] + 0.5, pressed, modifiers))
             self.app.frame()
             mouse.move(left + pixel[0], top + pixel[1])
 

@@ -93,10 +93,10 @@ def check_movie(path: Path) -> None:
     if suffix not in _WRITERS:
         raise InvalidInput(f"a movie ends in {', '.join(_WRITERS)}, but got {path.name!r}.")
     try:
-        import PIL.Image  # noqa: F401
+        import PIL.Image  # noqa: F401  (whether it is there)
 
         if suffix == ".webm":
-            import av  # noqa: F401
+            import av  # noqa: F401  (whether it is there)
     except ImportError as missing:
         what = "Pillow" if "PIL" in str(missing) else "PyAV"
         raise InvalidInput(f"a movie {suffix} needs {what}: pip install 'contact-core[movies]'.") from None

@@ -34,13 +34,14 @@ def film_state(view: FilmView) -> dict[str, Any]:
     }
 
 
-def drag(session: Session, what: str, name: str, frame: float, part: str, to: float) -> None:
-    """Let go of what was dragged, a part of a span of a pair or a key of a track: one step. Raises ContactError."""
+def drag(session: Session, what: str, name: str, frame: float, part: Any, to: float) -> None:
+    """Let go of what was dragged, a part of a span of a pair or a key of a track: one step. The verbs check
+    what the page says. Raises ContactError."""
     if what == "span":
-        session.timeline.move_span(name, frame, part, to)  # type: ignore[arg-type]
+        session.timeline.move_span(name, frame, part, to)
     elif what == "key":
-        kind, of = of_address(name)
-        session.timeline.move_key(kind, of, frame, to)  # type: ignore[arg-type]
+        address: tuple[Any, str] = of_address(name)
+        session.timeline.move_key(*address, frame, to)
     else:
         raise InvalidInput(f"spans and keys can be dragged, but got {what!r}.")
 

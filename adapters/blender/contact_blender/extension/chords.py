@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from contact_core.interaction.events import Pointer
+    from contact_core.interaction.events import Button, Pointer, PointerKind
 
 _NAMES = {
     "Escape": "ESC", "Enter": "RET", "Space": "SPACE", "Tab": "TAB", "Backspace": "BACK_SPACE", "Delete": "DEL",
@@ -65,12 +65,12 @@ def taken_twice(actions: Iterable[Mapping[str, Any]]) -> list[str]:
     return sorted({chord for chord in found if found.count(chord) > 1})
 
 
-def pointer_of(event: Any, height: int, kind: str, button: str = "none") -> Pointer:
+def pointer_of(event: Any, height: int, kind: PointerKind, button: Button = "none") -> Pointer:
     """What a mouse event did. height: of its region, pixels."""
     from contact_core.interaction.events import Pointer
 
-    held = [name for name in ("ctrl", "alt", "shift") if getattr(event, name)]
+    held: list[Any] = [name for name in ("ctrl", "alt", "shift") if getattr(event, name)]
     if getattr(event, "oskey", False):
         held.append("ctrl")
     x, y = event.mouse_region_x + 0.5, height - event.mouse_region_y - 0.5
-    return Pointer(kind, x, y, button, frozenset(held), pressure=float(event.pressure))  # type: ignore[arg-type]
+    return Pointer(kind, x, y, button, frozenset(held), pressure=float(event.pressure))

@@ -40,6 +40,24 @@ class _Modal:
         self._say(context, artist.status())
         return {"RUNNING_MODAL"}
 
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Blender's call for each event: `_event` says what comes of it."""
+        if self._is_lost(context):
+            self._put_back()
+            return self._end(context, "CANCELLED")
+        try:
+            return self._event(context, event)
+        except Exception as error:
+            return self._failed(context, error)
+
+    def _event(self, context: Any, event: Any) -> set[str]:
+        raise NotImplementedError
+
+    def cancel(self, context: Any) -> None:
+        """Blender ends it: the window closes, or another file is opened."""
+        self._put_back()
+        self._end(context, "CANCELLED")
+
     def _is_lost(self, context: Any) -> bool:
         """Whether the view or the mode that this began in has gone, or the session with its scene."""
         held = shared.held()
@@ -94,7 +112,7 @@ class CONTACT_OT_gesture(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
     bl_idname = "contact.gesture"
     bl_label = "Contact Tool"
     bl_options = {"BLOCKING"}  # noqa: RUF012 (Blender's spelling)
-    tool: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # type: ignore[valid-type]
+    tool: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # type: ignore[valid-type]  # so Blender declares
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -125,15 +143,6 @@ class CONTACT_OT_gesture(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
             refuse(self, context, artist.interaction.status.refusal)
         return {"CANCELLED"}
 
-    def modal(self, context: Any, event: Any) -> set[str]:
-        if self._is_lost(context):
-            self._put_back()
-            return self._end(context, "CANCELLED")
-        try:
-            return self._event(context, event)
-        except Exception as error:
-            return self._failed(context, error)
-
     def _event(self, context: Any, event: Any) -> set[str]:
         from contact_blender.extension.chords import pointer_of
         from contact_blender.extension.region_view import view_of
@@ -160,19 +169,14 @@ class CONTACT_OT_gesture(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
             self._say(context, artist.status())
         return {"RUNNING_MODAL"}  # Ctrl+Z among them: a gesture is taken back by Escape
 
-    def cancel(self, context: Any) -> None:
-        """Blender ends it: the window closes, or another file is opened."""
-        self._put_back()
-        self._end(context, "CANCELLED")
 
-
-class CONTACT_OT_hover(bpy.types.Operator):  # noqa: N801
+class CONTACT_OT_hover(bpy.types.Operator):  # noqa: N801 (Blender's spelling)
     """Show what the contact tool in the hand would do here"""
 
     bl_idname = "contact.hover"
     bl_label = "Contact Tool Hover"
-    bl_options = {"INTERNAL"}  # noqa: RUF012
-    tool: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # type: ignore[valid-type]
+    bl_options = {"INTERNAL"}  # noqa: RUF012 (Blender's spelling)
+    tool: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # type: ignore[valid-type]  # so Blender declares
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         if shared.missing() or why_not(context, ""):
@@ -202,17 +206,17 @@ class CONTACT_OT_hover(bpy.types.Operator):  # noqa: N801
             log.debug("hovering: %s", error)
 
 
-class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801
+class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's spelling)
     """Let the solver look beside the window. Enter keeps what it proposes, Escape leaves it"""
 
     bl_idname = "contact.propose"
     bl_label = "Propose a Pose"
-    bl_options = {"BLOCKING"}  # noqa: RUF012
-    action: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    bl_options = {"BLOCKING"}  # noqa: RUF012 (Blender's spelling)
+    action: bpy.props.EnumProperty(  # type: ignore[valid-type]  # so Blender declares
         name="What",
         items=[(f"pose.{each}", each.capitalize(), "") for each in ("solve", "settle", "slide", "suggest")],
     )
-    at_once: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    at_once: bpy.props.BoolProperty(  # type: ignore[valid-type]  # so Blender declares
         name="Keep at once", description="Keep what is found without asking", options={"SKIP_SAVE"}
     )
 
@@ -235,15 +239,6 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801
         except Exception as error:
             return self._failed(context, error)
         return self._start(context, artist)
-
-    def modal(self, context: Any, event: Any) -> set[str]:
-        if self._is_lost(context):
-            self._put_back()
-            return self._end(context, "CANCELLED")
-        try:
-            return self._event(context, event)
-        except Exception as error:
-            return self._failed(context, error)
 
     def _event(self, context: Any, event: Any) -> set[str]:
         artist = shared.artist()
@@ -316,18 +311,13 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801
         if held is not None and held.artist is not None:
             held.artist.leave()
 
-    def cancel(self, context: Any) -> None:
-        """Blender ends it."""
-        self._put_back()
-        self._end(context, "CANCELLED")
 
-
-class CONTACT_OT_radius(_Modal, bpy.types.Operator):  # noqa: N801
+class CONTACT_OT_radius(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's spelling)
     """Set the radius of the brush in the hand by moving the pointer; a click keeps it, Escape puts it back"""
 
     bl_idname = "contact.radius"
     bl_label = "Contact Brush Radius"
-    bl_options = {"BLOCKING"}  # noqa: RUF012
+    bl_options = {"BLOCKING"}  # noqa: RUF012 (Blender's spelling)
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -343,34 +333,21 @@ class CONTACT_OT_radius(_Modal, bpy.types.Operator):  # noqa: N801
             return self._failed(context, error)
         return self._start(context, artist)
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def _event(self, context: Any, event: Any) -> set[str]:
         from contact_blender.extension.chords import pointer_of
         from contact_blender.extension.region_view import view_of
 
-        view = view_of(context)
-        if (
-            self._is_lost(context)
-            or view is None
-            or (event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS")
-        ):
+        artist, view = shared.artist(), view_of(context)
+        if view is None or (event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS"):
             self._put_back()
             return self._end(context, "CANCELLED")
-        try:
-            artist = shared.artist()
-            if event.type in ("LEFTMOUSE", "RET") and event.value == "PRESS":
-                artist.keep_radius(pointer_of(event, view.viewport[1], "press", "left"), view)
-                return self._end(context, "FINISHED")
-            if event.type in _MOVES:
-                artist.move(pointer_of(event, view.viewport[1], "move"), view)
-                self._say(context, artist.status())
-        except Exception as error:
-            return self._failed(context, error)
+        if event.type in ("LEFTMOUSE", "RET") and event.value == "PRESS":
+            artist.keep_radius(pointer_of(event, view.viewport[1], "press", "left"), view)
+            return self._end(context, "FINISHED")
+        if event.type in _MOVES:
+            artist.move(pointer_of(event, view.viewport[1], "move"), view)
+            self._say(context, artist.status())
         return {"RUNNING_MODAL"}
-
-    def cancel(self, context: Any) -> None:
-        """Blender ends it."""
-        self._put_back()
-        self._end(context, "CANCELLED")
 
 
 def is_ready(operator: Any, context: Any) -> bool:

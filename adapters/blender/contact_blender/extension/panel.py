@@ -149,7 +149,7 @@ class CONTACT_UL_patches(bpy.types.UIList):  # noqa: N801 (Blender's spelling)
         row.label(text="", icon="LINKED" if item.pair else "BLANK1")
 
 
-class CONTACT_UL_pairs(bpy.types.UIList):  # noqa: N801
+class CONTACT_UL_pairs(bpy.types.UIList):  # noqa: N801 (Blender's spelling)
     """Pairs: what touches what, and how near it came."""
 
     def draw_item(
@@ -195,7 +195,7 @@ class _OfPatches(_InSidebar):
         return found is not None and bool(found.session.document.patches)
 
 
-class CONTACT_PT_contacts(_InSidebar, bpy.types.Panel):  # noqa: N801
+class CONTACT_PT_contacts(_InSidebar, bpy.types.Panel):  # noqa: N801 (Blender's spelling)
     """Surfaces and patches."""
 
     bl_label = "Contact"
@@ -215,7 +215,7 @@ class CONTACT_PT_contacts(_InSidebar, bpy.types.Panel):  # noqa: N801
             _draw_patches(layout, context.window_manager.contact, found.session.document)
 
 
-class CONTACT_PT_shape(_OfPatches, bpy.types.Panel):  # noqa: N801
+class CONTACT_PT_shape(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spelling)
     """Where the active patch lies, and its shape."""
 
     bl_label = "Edit Patch"
@@ -238,7 +238,7 @@ class CONTACT_PT_shape(_OfPatches, bpy.types.Panel):  # noqa: N801
         scale.along, scale.spread = settings.along, settings.spread
 
 
-class CONTACT_PT_pairs(_OfPatches, bpy.types.Panel):  # noqa: N801
+class CONTACT_PT_pairs(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spelling)
     """What touches what, and what follows what."""
 
     bl_label = "Pairs and Links"
@@ -257,7 +257,7 @@ class CONTACT_PT_pairs(_OfPatches, bpy.types.Panel):  # noqa: N801
         row.operator("contact.unlink")
 
 
-class CONTACT_PT_pose(_OfPatches, bpy.types.Panel):  # noqa: N801
+class CONTACT_PT_pose(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spelling)
     """The pose in which the pairs touch."""
 
     bl_label = "Pose"

@@ -205,7 +205,7 @@ def keymap(tool: str) -> tuple[Any, ...]:
 # -- the pie menu -------------------------------------------------------------------------------------------------
 
 
-class CONTACT_MT_pie(bpy.types.Menu):  # noqa: N801
+class CONTACT_MT_pie(bpy.types.Menu):  # noqa: N801 (Blender's spelling)
     """Contact tools and what is solved for, round the pointer."""
 
     bl_label = "Contact"
@@ -217,7 +217,7 @@ class CONTACT_MT_pie(bpy.types.Menu):  # noqa: N801
             pie.operator(operator_of(action), text=labels[action])
 
 
-class CONTACT_PT_live(bpy.types.Panel):  # noqa: N801
+class CONTACT_PT_live(bpy.types.Panel):  # noqa: N801 (Blender's spelling)
     """How the hand follows while contacts are dragged."""
 
     bl_label = "Following"
