@@ -126,8 +126,8 @@ class Library:
 
         names = self.names()
         near = difflib.get_close_matches(name, names, n=3) or names[:5]
-        have = f"it has {', '.join(near)}" if near else "it has none yet"
-        raise FileRefused(f"the library {self.folder} has no grasp {name!r}; {have}.")
+        have = f"{len(names)}, among them {', '.join(near)} (`contact library list`)" if near else "none yet"
+        raise FileRefused(f"the library {self.folder} has no grasp {name!r}; it has {have}.")
 
     # -- writing -------------------------------------------------------------------------------------------------
 
