@@ -125,8 +125,9 @@ class Library:
         import difflib
 
         names = self.names()
-        near = difflib.get_close_matches(name, names, n=3) or names[:5]
-        have = f"{len(names)}, among them {', '.join(near)} (`contact library list`)" if near else "none yet"
+        have = ", ".join(difflib.get_close_matches(name, names, n=3)) or "none yet"
+        if names and have == "none yet":
+            have = f"{len(names)}, among them {', '.join(names[:5])} (`contact library list`)"
         raise FileRefused(f"the library {self.folder} has no grasp {name!r}; it has {have}.")
 
     # -- writing -------------------------------------------------------------------------------------------------
