@@ -44,12 +44,14 @@ typecheck: $(READY)
 pytest: $(READY)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -q
 
-# 500 processes that edit and save killed at random, 20 workers of a batch, 1000 damages of each stored format; then the laws on examples that nobody drew
-# before, ROUNDS times over.
+# 500 processes that edit and save killed at random, 20 workers of a batch, 1000 damages of each stored format; each reader
+# FUZZ seconds long given files that were spoilt at random; then the laws on examples that nobody drew before, ROUNDS times over.
 ROUNDS ?= 5
+FUZZ ?= 60
 explore: $(READY)
 	CONTACT_KILLS=500 CONTACT_BATCH_KILLS=20 $(BIN)/pytest -n 2 -q tests/core/edit/test_journal.py tests/core/farm -k kill
 	CONTACT_FLIPS=1000 $(BIN)/pytest -n 2 -q tests/core/test_sealed.py
+	CONTACT_FUZZ=$(FUZZ) $(BIN)/pytest -n 2 -q tests/fire/test_readers.py
 	for round in $$(seq $(ROUNDS)); do OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 \
 		$(BIN)/pytest -n 2 --dist loadfile -q -m hypothesis --hypothesis-profile explore || exit 1; done
 

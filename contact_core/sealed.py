@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, shortened
 
 DIGEST = "digest"
 
@@ -31,6 +31,18 @@ def unsealed(data: Mapping[str, Any], source: str) -> dict[str, Any]:
             f' you edited it yourself, set its "{DIGEST}" to null.'
         )
     return plain
+
+
+def json_mistake(error: Exception) -> str:
+    """What is wrong with JSON, in words: of the error that decoding bytes or parsing them raised."""
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    if isinstance(error, UnicodeError):
+        return f"it is not UTF-8 text (byte {error.start})" if isinstance(error, UnicodeDecodeError) else "no text"
+    if isinstance(error, json.JSONDecodeError):
+        return f"{error.msg} in line {error.lineno}, column {error.colno}"
+    said = str(error)
+    return "it holds a number of more digits than any that is meant" if "digits" in said else shortened(said)
 
 
 def _digest(data: Mapping[str, Any]) -> str:

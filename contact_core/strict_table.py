@@ -47,7 +47,7 @@ class Table:
             if key not in self._asked:
                 near = difflib.get_close_matches(str(key), self._asked, n=1)
                 hint = f"did you mean {near[0]!r}?" if near else f"it knows {', '.join(sorted(self._asked))}."
-                raise InvalidInput(f"{self.where} has no key {key!r}; {hint}")
+                raise InvalidInput(f"{self.where} has no key {quoted(key)}; {hint}")
 
     def raw(self, key: str, default: Any = _REQUIRED) -> Any:
         """A value of any kind."""

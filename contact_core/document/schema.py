@@ -17,7 +17,8 @@ from contact_core.document.codec import Fragment, from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, Patch, is_name
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.time_checks import time_inconsistencies
-from contact_core.errors import EditedFile, FileRefused, shortened
+from contact_core.errors import EditedFile, FileRefused, quoted, shortened
+from contact_core.sealed import json_mistake
 
 SCHEMA = "contact-core.document"
 VERSION = 1
@@ -126,7 +127,7 @@ def parse_json(text: bytes, source: str) -> Any:
     try:
         return json.loads(text.decode(), parse_constant=_refuse_constant, object_pairs_hook=_object_of)
     except (ValueError, RecursionError) as error:  # JSONDecodeError and UnicodeDecodeError are ValueErrors
-        raise FileRefused(f"{source} is not valid JSON: {error}.") from error
+        raise FileRefused(f"{source} is not valid JSON: {json_mistake(error)}.") from error
 
 
 def open_envelope(
@@ -141,14 +142,14 @@ def open_envelope(
     """The fields of schema-and-version data without those two, brought up to `version`. Raises FileRefused."""
     if not isinstance(data, dict) or data.get(schema_key) != schema:
         found = data.get(schema_key) if isinstance(data, dict) else type(data).__name__
-        raise FileRefused(f"{source} is not a {schema} file (its schema is {found!r}).")
+        raise FileRefused(f"{source} is not a {schema} file (its schema is {quoted(found)}).")
     came = data.get("version")
     if not isinstance(came, int) or isinstance(came, bool) or came < 1:
-        raise FileRefused(f"{source} names no version that exists ({came!r}).")
+        raise FileRefused(f"{source} names no version that exists ({quoted(came)}).")
     if came > version:
         raise FileRefused(
-            f"{source} was written as {schema} version {came}, but this release reads up to version {version}:"
-            f" install a newer contact-core. The file is left untouched."
+            f"{source} was written as {schema} version {quoted(came)}, but this release reads up to version"
+            f" {version}: install a newer contact-core. The file is left untouched."
         )
     body = {key: item for key, item in data.items() if key not in (schema_key, "version")}
     for step in range(came, version):

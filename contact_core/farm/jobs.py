@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contact_core.atomic_file import read_bounded
-from contact_core.errors import FileRefused, InvalidInput
+from contact_core.errors import FileRefused, InvalidInput, shortened
 from contact_core.plugins.slots import JobKind
 
 LIST_SUFFIX = ".txt"
 SUMMARY = "batch.json"  # a folder that holds one is the output of a batch: no jobs are looked for in it
 MOST_JOBS = 100_000
 _MOST_LIST_BYTES = 64_000_000
+_LONGEST_NAME = 255  # bytes of a file's name, everywhere
 
 
 @dataclass(frozen=True)
@@ -54,10 +55,17 @@ def find_jobs(sources: Iterable[Path | str], kinds: Mapping[str, JobKind], out: 
 def _paths(source: str, folder: Path, kinds: Mapping[str, JobKind], out: Path) -> Iterator[Path]:
     """Absolute paths of the files behind one source. folder: what relative paths start from."""
     path = Path(os.path.normpath((folder / source).absolute()))  # a link stays: it is a name that somebody chose
+    if any(len(os.fsencode(part)) > _LONGEST_NAME for part in path.parts):
+        raise FileRefused(f"{shortened(source)} is no job: no file has a name as long as that.")
     if not path.exists() and any(letter in source for letter in "*?["):
-        found = sorted(p for p in Path(path.anchor).glob(str(path.relative_to(path.anchor))) if p.is_file())
+        try:
+            found = sorted(p for p in Path(path.anchor).glob(str(path.relative_to(path.anchor))) if p.is_file())
+        except (OSError, ValueError) as error:
+            raise FileRefused(
+                f"{shortened(source)} is no pattern of files: use *, ? and ** between slashes."
+            ) from error
         if not found:
-            raise FileRefused(f"no file is called as {source} says.")
+            raise FileRefused(f"no file is called as {shortened(source)} says.")
         yield from found
     elif path.is_dir():
         yield from _claimed(path, kinds, out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from contact_core.errors import ContactError, FileRefused, InvalidInput
+from contact_core.errors import ContactError, FileRefused, InvalidInput, shortened
 from contact_core.grasping.verdict import ACCEPT
 from contact_core.recipe.recipe import (
     AssetSource,
@@ -44,7 +44,7 @@ def parse_recipe(text: str, *, name: str, folder: Path | None = None) -> Recipe:
     try:
         return _recipe(Table(values, "recipe"), folder)
     except ContactError as error:
-        raise type(error)(f"{name}: {error}") from error
+        raise type(error)(f"{name}: {shortened(str(error), 1000)}") from error
 
 
 def _recipe(top: Table, folder: Path | None) -> Recipe:

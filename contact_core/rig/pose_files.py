@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from contact_core.atomic_file import write_atomic
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, quoted
 from contact_core.rig.rig import Pose
-from contact_core.sealed import sealed, unsealed
+from contact_core.sealed import json_mistake, sealed, unsealed
 
 SCHEMA = 1
 LARGEST_FILE = 64_000_000  # bytes
@@ -37,7 +37,10 @@ def _pose(data: Mapping[str, Any], path: Path) -> Pose:
         joints = tuple(str(name) for name in data["joints"])
         return Pose(joints, np.array(data["local"], float).reshape(len(joints), 4, 4))
     except (KeyError, TypeError, ValueError) as error:
-        raise FileRefused(f"{path.name} holds no pose that can be read: {error}.") from error
+        raise FileRefused(
+            f"{path.name} holds no pose that can be read: wanted are names of joints, and for each a matrix of 16"
+            " numbers."
+        ) from error
 
 
 def _read(path: Path | str, kind: str) -> dict[str, Any]:
@@ -48,10 +51,10 @@ def _read(path: Path | str, kind: str) -> dict[str, Any]:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
-    except ValueError as error:
-        raise FileRefused(f"{path.name} is no JSON: {error}.") from error
+    except (ValueError, RecursionError) as error:
+        raise FileRefused(f"{path.name} is no JSON: {json_mistake(error)}.") from error
     if not isinstance(data, dict) or data.get("kind") != kind:
         raise FileRefused(f"{path.name} is not a file of the kind {kind}.")
     if data.get("schema") != SCHEMA:
-        raise FileRefused(f"{path.name} has schema {data.get('schema')!r}; this version reads {SCHEMA}.")
+        raise FileRefused(f"{path.name} has schema {quoted(data.get('schema'))}; this version reads {SCHEMA}.")
     return unsealed(data, path.name)

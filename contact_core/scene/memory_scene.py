@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.atomic_file import write_atomic
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.errors import FileRefused, InvalidInput, quoted
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.rig.rig import JointFreedom, Pose, Rig
 from contact_core.scene.host import DocumentStamp, SceneSpace, StoredDocument
 
@@ -154,8 +154,7 @@ def load_scene(path: Path) -> MemoryScene:
         raise
     except Exception as error:  # zipfile and numpy answer damaged bytes with a dozen kinds of errors
         raise FileRefused(
-            f"{path} is no scene of the memory host, or damaged ({quoted(str(error))}):"
-            " take an earlier copy, or save it anew."
+            f"{path} is no scene of the memory host, or damaged: take an earlier copy, or save it anew."
         ) from error
 
 

@@ -31,6 +31,12 @@ class UsdFiles:
     def read(self, path: Path, *, sidecar: Path | None = None) -> Asset:
         """The one rig of a stage, else its surfaces as one mesh in the world. Raises FileRefused, MissingExtra."""
         host = _host(path)
+        from contact_usd.stage_io import refusing
+
+        with refusing(path):  # binary layers are read when somebody asks, and may be damaged there
+            return self._read(host, path, sidecar)
+
+    def _read(self, host: UsdHost, path: Path, sidecar: Path | None) -> Asset:
         if sidecar is not None:
             raise FileRefused(
                 f"{path} keeps its joint limits on the skeleton (contact:jointFreedoms), so the rig sidecar"

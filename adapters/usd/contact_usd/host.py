@@ -69,7 +69,8 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
             owned = stage_io.open_stage(Path(path))
         self._owned = owned or stage_io.new_stage(space or SceneSpace(1.0, "Y"))
         self._bindings: dict[str, Binding] | None = None
-        self._undo = LayerUndo(self._owned.layer)
+        with stage_io.refusing(self._owned.source or Path(self._owned.layer.identifier)):
+            self._undo = LayerUndo(self._owned.layer)  # copies it: what a damaged binary layer holds is read now
         # Any layer may change what is bound to what, not only ours: a DCC edits its own at any time.
         self._key = Tf.Notice.Register(Usd.Notice.ObjectsChanged, self._forget, self._owned.stage)
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdSkel
+from pxr import Usd, UsdGeom, UsdSkel, Vt
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
@@ -70,7 +70,8 @@ def skinned_meshes(binding: UsdSkel.Binding) -> Iterator[UsdSkel.SkinningQuery]:
 def joint_names(skeleton: UsdSkel.Skeleton) -> tuple[str, ...]:
     """Unique names: `jointNames` where authored, else the last part of each path, else whole paths."""
     paths = [str(token) for token in skeleton.GetJointsAttr().Get() or ()]
-    given = [str(token) for token in skeleton.GetJointNamesAttr().Get() or ()]
+    names_given = skeleton.GetJointNamesAttr().Get()
+    given = list(map(str, names_given)) if isinstance(names_given, Vt.TokenArray) else []
     for names in (given, [path.rsplit("/", 1)[-1] for path in paths]):
         if len(names) == len(paths) == len(set(names)):
             return tuple(names)
@@ -271,7 +272,7 @@ def _rest_local(
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """(j, 4, 4) rest transforms, or those of the bind pose where none are authored."""
     given = skeleton.GetRestTransformsAttr().Get()
-    if given is not None and len(given) == len(parents):
+    if isinstance(given, Vt.Matrix4dArray) and len(given) == len(parents):  # a layer may name any type
         return np.stack([matrix_of(m) for m in given]), ()
     above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
     return np.linalg.inv(above) @ bind, ("the skeleton has no rest pose; its bind pose stands in.",)

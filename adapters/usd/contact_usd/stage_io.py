@@ -18,7 +18,7 @@ from typing import Literal
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from contact_core.atomic_file import replacing
-from contact_core.errors import ContactError, FileRefused, InvalidInput
+from contact_core.errors import ContactError, FileRefused, InvalidInput, shortened
 from contact_core.scene.host import SceneSpace
 
 SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
@@ -166,7 +166,8 @@ def reason(error: Exception) -> str:
         said = error.args[0].commentary if isinstance(error, Tf.ErrorException) and error.args else str(error)
     except UnicodeDecodeError:
         said = ""
-    return " ".join(re.sub(r"matching \S*(?=.* at ')|pxrInternal_\w*::", "", said).split()) or "it is damaged."
+    told = " ".join(re.sub(r"matching \S*(?=.* at ')|pxrInternal_\w*::", "", said).split())
+    return shortened(told) or "it is damaged."
 
 
 def _open_ours(path: Path) -> OwnedStage:

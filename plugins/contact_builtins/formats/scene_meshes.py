@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -26,6 +27,7 @@ _UNITS_3MF = {
     "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0,
 }  # fmt: skip
 _CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+_DAMAGED_ZIP = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError)
 _DEEPEST = 32  # components within components
 
 
@@ -131,7 +133,7 @@ def parse_3mf(data: bytes) -> Parsed:
             if package.getinfo(main).file_size > MAX_FILE_BYTES:
                 raise InvalidInput("its model is too large to be unpacked")
             text = package.read(main)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
+    except _DAMAGED_ZIP as error:
         raise InvalidInput("it is no 3MF package, which is a zip archive") from error
     root = _check_xml(text)
     unit = root.get("unit", "millimeter")

@@ -12,12 +12,13 @@ import numpy as np
 
 from contact_builtins.formats.refusal import file_bytes
 from contact_core.arrays import FloatArray
-from contact_core.errors import FileRefused, InvalidInput
+from contact_core.errors import FileRefused, InvalidInput, quoted
 from contact_core.hands.description import HandWords
 from contact_core.rig.rig import ROTATION_DOFS, JointFreedom
 from contact_core.strict_table import parse_toml
 
 SCHEMA = 1
+LONGEST_NAME = 500  # letters of a joint's name or pattern: matching grows with their square
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
 ANGLES = ("twist", "spread", "flexion")  # about the frame's x, y, z
 TOP_KEYS = {"schema", "meters_per_unit", "up_axis", "guess", "joint", "mirror", "hand"}
@@ -49,7 +50,7 @@ class Sidecar:
         for name, parent in found.items():
             if parent and parent not in names:
                 raise FileRefused(
-                    f"{self.path}: joint {name!r} wants the parent {parent!r}, which the rig has not."
+                    f"{self.path}: joint {name!r} wants the parent {quoted(parent)}, which the rig has not."
                 )
         return found
 
@@ -60,8 +61,13 @@ class Sidecar:
             for name in self._matches(rule, names):
                 try:
                     result[name] = _changed(result[name], rule)
-                except (InvalidInput, TypeError, ValueError, KeyError) as error:
-                    raise FileRefused(f"{self.path}: the rule for {rule['match']!r}: {error}") from error
+                except InvalidInput as error:
+                    raise FileRefused(f"{self.path}: the rule for {quoted(rule['match'])}: {error}") from error
+                except (TypeError, ValueError, KeyError, OverflowError) as error:
+                    raise FileRefused(
+                        f"{self.path}: the rule for {quoted(rule['match'])} holds a value of another kind than is"
+                        " wanted; docs/rig-sidecar.md has them all."
+                    ) from error
         return tuple(result[name] for name in names)
 
     def _matches(self, rule: dict[str, Any], names: Sequence[str]) -> list[str]:
@@ -69,7 +75,7 @@ class Sidecar:
         matched = [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
         if not matched:
             raise FileRefused(
-                f"{self.path}: {rule['match']!r} matches no joint; the rig has {', '.join(list(names)[:6])}"
+                f"{self.path}: {quoted(rule['match'])} matches no joint; the rig has {', '.join(list(names)[:6])}"
                 f"{', ...' if len(names) > 6 else '.'}"
             )
         return matched
@@ -90,7 +96,9 @@ def read_sidecar(path: Path) -> Sidecar:
     except InvalidInput as error:
         raise FileRefused(str(error)) from error
     if table.get("schema") != SCHEMA:
-        raise FileRefused(f"{path} needs the line `schema = {SCHEMA}` first, but got {table.get('schema')!r}.")
+        raise FileRefused(
+            f"{path} needs the line `schema = {SCHEMA}` first, but got {quoted(table.get('schema'))}."
+        )
     _known(path, table, TOP_KEYS, "the top level")
     rules = table.get("joint", [])
     if not isinstance(rules, list) or not all(isinstance(rule, dict) for rule in rules):
@@ -98,19 +106,19 @@ def read_sidecar(path: Path) -> Sidecar:
     for rule in rules:
         _known(path, rule, JOINT_KEYS, "a [[joint]]")
         patterns = rule.get("match")
-        listed = isinstance(patterns, list) and all(isinstance(pattern, str) for pattern in patterns)
-        if not isinstance(patterns, str) and not listed:
+        listed = patterns if isinstance(patterns, list) else [patterns]
+        if not all(isinstance(pattern, str) and len(pattern) <= LONGEST_NAME for pattern in listed):
             raise FileRefused(f"{path}: each [[joint]] needs `match`, a joint name or pattern, or a list of them.")
         if not isinstance(rule.get("parent", ""), str):
-            raise FileRefused(f'{path}: `parent` of {patterns!r} must be a joint name, or "" for a root.')
+            raise FileRefused(f'{path}: `parent` of {quoted(patterns)} must be a joint name, or "" for a root.')
     mirror = table.get("mirror", {})
     if not isinstance(mirror, dict) or not all(isinstance(name, str) for name in mirror.values()):
         raise FileRefused(f"{path}: [mirror] maps left joint names to right joint names.")
     scale, up = table.get("meters_per_unit"), table.get("up_axis")
     if scale is not None and not (isinstance(scale, int | float) and 0 < scale < float("inf")):
-        raise FileRefused(f"{path}: meters_per_unit must be a positive number, but got {scale!r}.")
+        raise FileRefused(f"{path}: meters_per_unit must be a positive number, but got {quoted(scale)}.")
     if up not in (None, "X", "Y", "Z"):
-        raise FileRefused(f'{path}: up_axis is "X", "Y" or "Z", but got {up!r}.')
+        raise FileRefused(f'{path}: up_axis is "X", "Y" or "Z", but got {quoted(up)}.')
     return Sidecar(
         path, tuple(rules), mirror, bool(table.get("guess", True)), scale, up, _hands(path, table.get("hand", []))
     )
@@ -127,7 +135,7 @@ def _hands(path: Path, tables: Any) -> tuple[HandWords, ...]:
                 f"{path}: each [[hand]] needs `hub`, the joint at which its digits part; `thumb` is a joint."
             )
         if table.get("side", "") not in ("", "left", "right"):
-            raise FileRefused(f'{path}: side is "left" or "right", but got {table["side"]!r}.')
+            raise FileRefused(f'{path}: side is "left" or "right", but got {quoted(table["side"])}.')
         digits = table.get("digits", {})
         if not isinstance(digits, dict) or not all(isinstance(name, str) for name in digits.values()):
             raise FileRefused(f"{path}: `digits` of a [[hand]] maps roles to joint names.")
@@ -137,20 +145,21 @@ def _hands(path: Path, tables: Any) -> tuple[HandWords, ...]:
             for table in tables
         )
     except (InvalidInput, TypeError, ValueError) as error:
-        raise FileRefused(f"{path}: `palm` of a [[hand]]: {error}") from error
+        said = str(error) if isinstance(error, InvalidInput) else f"it is a direction, but got {quoted(tables)}."
+        raise FileRefused(f"{path}: `palm` of a [[hand]]: {said}") from error
 
 
 def _known(path: Path, table: dict[str, Any], keys: set[str], where: str) -> None:
     unknown = sorted(set(table) - keys)
     if unknown:
-        raise FileRefused(f"{path}: {where} has no {unknown[0]!r}; it knows {', '.join(sorted(keys))}.")
+        raise FileRefused(f"{path}: {where} has no {quoted(unknown[0])}; it knows {', '.join(sorted(keys))}.")
 
 
 def _changed(freedom: JointFreedom, rule: dict[str, Any]) -> JointFreedom:
     """A freedom after one rule. Raises InvalidInput, TypeError or ValueError."""
     kind = rule.get("kind", "hinge" if "axis" in rule else freedom.kind)
     if kind not in ROTATION_DOFS:
-        raise InvalidInput(f"kind is one of {', '.join(ROTATION_DOFS)}, but got {kind!r}")
+        raise InvalidInput(f"kind is one of {', '.join(ROTATION_DOFS)}, but got {quoted(kind)}")
     if kind != freedom.kind:
         freedom = JointFreedom(kind=kind, frame=freedom.frame, translates=freedom.translates)
     if "axis" in rule:
@@ -169,7 +178,7 @@ def _changed(freedom: JointFreedom, rule: dict[str, Any]) -> JointFreedom:
     if "prior" in rule:
         weights = np.broadcast_to(np.asarray(rule["prior"], float), ROTATION_DOFS[freedom.kind])
         if not (np.isfinite(weights).all() and (weights >= 0).all()):
-            raise InvalidInput(f"prior weights are not negative, but got {rule['prior']!r}")
+            raise InvalidInput(f"prior weights are not negative, but got {quoted(rule['prior'])}")
         freedom = replace(freedom, prior_weight=np.array(weights))
     return _locked(freedom, rule["lock"]) if "lock" in rule else freedom
 
@@ -183,7 +192,7 @@ def _limited(freedom: JointFreedom, rule: dict[str, Any]) -> JointFreedom:
     for key, pair in given.items():
         low, high = (float(value) for value in pair)
         if not low <= high:
-            raise InvalidInput(f"{key} goes from a smaller to a larger angle, but got {pair!r}")
+            raise InvalidInput(f"{key} goes from a smaller to a larger angle, but got {quoted(pair)}")
         if key in ANGLES and freedom.kind == "euler":
             dof = ANGLES.index(key)
         elif key not in ANGLES and freedom.kind == "hinge":
@@ -200,7 +209,7 @@ def _locked(freedom: JointFreedom, lock: Any) -> JointFreedom:
         return replace(freedom, locked=np.full(ROTATION_DOFS[freedom.kind], lock))
     if freedom.kind != "euler" or not set(lock) <= set(ANGLES):
         raise InvalidInput(
-            f"lock is true, false, or a list of {', '.join(ANGLES)} on an Euler joint, but got {lock!r}"
+            f"lock is true, false, or a list of {', '.join(ANGLES)} on an Euler joint, but got {quoted(lock)}"
         )
     return replace(freedom, locked=np.array([angle in lock for angle in ANGLES]))
 
