@@ -36,14 +36,14 @@ class Times:
 
 def interleaved(contestants: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, Times]:
     """Call every contestant once per round, after one call of each that does not count. Each round begins with
-    another: whoever comes after one that fills the caches pays for it."""
+    another, and every second one runs backwards: whoever comes after one that fills the caches pays for it."""
     seconds: dict[str, list[float]] = {name: [] for name in contestants}
     for call in contestants.values():
         call()
     names = list(contestants)
     for turn in range(rounds):
         first = turn % len(names)
-        for name in names[first:] + names[:first]:
+        for name in (names[first:] + names[:first])[:: 1 if turn % 2 == 0 else -1]:
             began = time.process_time()
             contestants[name]()
             seconds[name].append(time.process_time() - began)

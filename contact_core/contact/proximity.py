@@ -27,7 +27,7 @@ def touching_vertices(
     points = transform_points(matrix, posed.points)
     normals = posed.vertex_normals @ matrix[:3, :3].T
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    used = np.unique(posed.faces)
+    used = posed.used_points
     used = used[length[used, 0] > 0.0]
     normals = normals[used] / length[used]
     near = Locator.of(other).closest(points[used], max_distance=distance, facing=normals if facing else None)

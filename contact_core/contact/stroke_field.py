@@ -90,7 +90,7 @@ def _vertices(mesh: TriangleMesh) -> tuple[IntArray, Any]:
     if "vertex tree" not in mesh.kept:
         from scipy.spatial import cKDTree
 
-        used = np.unique(mesh.faces)
+        used = mesh.used_points
         mesh.kept["vertex tree"] = used, cKDTree(mesh.points[used])
     used, tree = mesh.kept["vertex tree"]
     return used, tree

@@ -74,7 +74,7 @@ class DistanceField:
 
     @classmethod
     def _made(cls, mesh: TriangleMesh, resolution: int, margin: float, key: str) -> DistanceField:
-        used = mesh.points[np.unique(mesh.faces)]
+        used = mesh.points[mesh.used_points]
         if not len(used):
             raise InvalidInput("a distance field needs a mesh with faces, but it has none.")
         pad = margin * mesh.bounding_box_diagonal

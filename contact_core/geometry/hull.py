@@ -19,7 +19,7 @@ def convex_hull(
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    points = mesh.points[np.unique(mesh.faces)]
+    points = mesh.points[mesh.used_points]
     if low is not None:
         points = points[(points >= np.asarray(low)).all(axis=1)]
     if high is not None:

@@ -30,7 +30,7 @@ class Sunk(NamedTuple):
 
 def depth_inside(points: FloatArray, solid: TriangleMesh) -> FloatArray:
     """(n,) distance to the surface for points inside a solid by generalised winding number > 0.5, else 0."""
-    used = solid.points[np.unique(solid.faces)]
+    used = solid.points[solid.used_points]
     near = ((points >= used.min(axis=0)) & (points <= used.max(axis=0))).all(axis=1)
     depth = np.zeros(len(points))
     locator = Locator.of(solid)

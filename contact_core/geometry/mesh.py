@@ -60,9 +60,16 @@ class TriangleMesh:
         return corners
 
     @cached_property
+    def used_points(self) -> IntArray:
+        """(k,) the points that faces use, ascending."""
+        used = np.zeros(len(self.points), bool)
+        used[self.faces] = True
+        return np.flatnonzero(used)
+
+    @cached_property
     def bounding_box_diagonal(self) -> float:
         """Length of the diagonal of the box round the points that faces use (surface units)."""
-        used = self.points[np.unique(self.faces)] if len(self.faces) else self.points
+        used = self.points[self.used_points] if len(self.faces) else self.points
         return float(np.linalg.norm(np.ptp(used, axis=0))) if len(used) else 0.0
 
     @cached_property

@@ -65,13 +65,13 @@ def sound_polygons(
     check_polygons(sizes, indices, len(points))
     shape = Sides.of(sizes, indices)
     reach = np.zeros(len(points)) if exact else _reach(points, shape)
-    joining = _joining(points, sizes, indices, _groups(points, shape, reach, apart), either_sense=True)
+    joining = _joining(points, sizes, indices, shape, _groups(points, shape, reach, apart), either_sense=True)
     notes = list[str]()
     if not exact:
-        joining = _across_noise(points, sizes, indices, apart, joining, notes)
+        joining = _across_noise(points, sizes, indices, shape, apart, joining, notes)
     kept, sides = joining.kept, joining.sides
     winding, label = _wound(joining)
-    first = np.unique(label, return_index=True)[1]
+    first = _first_of_each(label)
     turned = _turned_outwards(points[first], sides.between(label), winding, clockwise, notes)
     return SoundPolygons(
         point_of=label,
@@ -79,7 +79,7 @@ def sound_polygons(
         sizes=sizes[kept],
         indices=label[_reversed_where(turned, sides)],
         face_of=np.flatnonzero(kept),
-        notes=(*_joining_notes(np.unique(sides.tail), label), *joining.notes, *notes, *_loose_notes(winding)),
+        notes=(*_joining_notes(sides.tail, label), *joining.notes, *notes, *_loose_notes(winding)),
     )
 
 
@@ -108,8 +108,11 @@ def _groups(points: FloatArray, sides: Sides, reach: FloatArray, apart: IntArray
     loose = open_sides(sides)
     on_border[sides.tail[loose]] = on_border[sides.head[loose]] = True
     group = close_points(points, np.where(on_border, np.where(np.isfinite(reach), reach, 0.0), 0.0))
-    shrunk = (group[sides.tail] == group[sides.head]) & (points[sides.tail] != points[sides.head]).any(axis=1)
-    if shrunk.any():  # chains of close points swallowed an edge: only equal positions join there
+    shrunk = np.flatnonzero(group[sides.tail] == group[sides.head])
+    shrunk = shrunk[(points[sides.tail[shrunk]] != points[sides.head[shrunk]]).any(axis=1)]
+    if not len(shrunk) and apart is None:
+        return group
+    if len(shrunk):  # chains of close points swallowed an edge: only equal positions join there
         equal = close_points(points, np.zeros(len(points)))
         lost = np.isin(group, group[sides.tail[shrunk]])
         group = np.where(lost, equal + len(points), group)
@@ -120,21 +123,16 @@ def _groups(points: FloatArray, sides: Sides, reach: FloatArray, apart: IntArray
 
 def _single_faces(group: IntArray, sizes: IntArray, indices: IntArray, notes: list[str]) -> BoolArray:
     """(f,) which faces have three corners or more in different places, and are the first to lie there."""
-    face, place = np.repeat(np.arange(len(sizes)), sizes), group[indices]
-    order = np.lexsort((place, face))
-    fresh = np.ones(len(order), bool)
-    fresh[1:] = (np.diff(face[order]) != 0) | (np.diff(place[order]) != 0)
-    corners = np.bincount(face[order[fresh]], minlength=len(sizes))
+    from contact_core.geometry.side_kernels import corners_of_faces
+
+    corners, mixed = np.empty(len(sizes), np.int64), np.empty(len(sizes), np.int64)
+    corners_of_faces(sizes, group[indices], np.full(len(group), -1, np.int64), corners, mixed)
     kept = corners >= 3
     if not kept.all():
         notes.append(f"{np.count_nonzero(~kept)} faces with fewer than 3 different corners were dropped.")
-    # faces of the same corners have the same sum of scrambled corners; those few are compared in full
-    mixed = (place.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xC2B2AE3D27D4EB4F)
-    sums = np.concatenate([np.zeros(1, np.uint64), np.cumsum(mixed, dtype=np.uint64)])
-    ends = np.cumsum(sizes)
-    _, alike, uses = np.unique(sums[ends] - sums[ends - sizes], return_inverse=True, return_counts=True)
-    suspects = np.flatnonzero(kept & (uses[alike.reshape(-1)] > 1))
+    ordered = np.sort(mixed)
+    twice = ordered[1:][ordered[1:] == ordered[:-1]]  # those few are compared in full
+    suspects = np.flatnonzero(kept & np.isin(mixed, twice)) if len(twice) else np.zeros(0, np.int64)
     doubles = _doubles(suspects, group, sizes, indices) if len(suspects) else []
     if doubles:
         kept[doubles] = False
@@ -175,11 +173,11 @@ class _Joining:
 
 
 def _joining(
-    points: FloatArray, sizes: IntArray, indices: IntArray, group: IntArray, *, either_sense: bool
+    points: FloatArray, sizes: IntArray, indices: IntArray, shape: Sides, group: IntArray, *, either_sense: bool
 ) -> _Joining:
     notes: list[str] = []
     kept = _single_faces(group, sizes, indices, notes)
-    sides = Sides.of(sizes[kept], indices[np.repeat(kept, sizes)])
+    sides = shape if kept.all() else Sides.of(sizes[kept], indices[np.repeat(kept, sizes)])
     pairs, label = np.zeros((0, 2), np.int64), np.arange(len(points))
     loose = open_sides(sides)
     if len(loose):
@@ -192,6 +190,7 @@ def _across_noise(
     points: FloatArray,
     sizes: IntArray,
     indices: IntArray,
+    sides: Sides,
     apart: IntArray | None,
     so_far: _Joining,
     notes: list[str],
@@ -204,7 +203,6 @@ def _across_noise(
     still = open_sides(so_far.sides.between(so_far.label))
     if not len(still):
         return so_far
-    sides = Sides.of(sizes, indices)
     border = np.unique(np.concatenate([so_far.sides.tail[still], so_far.sides.head[still]]))
     reach = SHARE_OF_EDGE * _shortest_edges(points, sides)
     gap = _gaps(points[border], so_far.label[border])
@@ -214,7 +212,7 @@ def _across_noise(
     widest = float(gap[near].max())
     group = _groups(points, sides, np.minimum(reach, 2.0 * widest), apart)  # twice: copies lie all round a point
     heap = len(still) > _HEAP * len(so_far.sides.face)
-    wider = _joining(points, sizes, indices, group, either_sense=heap)
+    wider = _joining(points, sizes, indices, sides, group, either_sense=heap)
     left = len(open_sides(wider.sides.between(wider.label)))
     if left > (1.0 - _MOST) * len(still):
         return so_far
@@ -279,6 +277,8 @@ def _turned_outwards(
 
 def _reversed_where(turned: BoolArray, sides: Sides) -> IntArray:
     """The corners of all faces, those of turned ones in the other direction."""
+    if not turned.any():
+        return sides.tail
     where = np.arange(len(sides.face))
     starts = np.searchsorted(sides.face, np.arange(len(turned)))
     ends = np.append(starts[1:], len(where))
@@ -286,8 +286,18 @@ def _reversed_where(turned: BoolArray, sides: Sides) -> IntArray:
     return sides.tail[np.where(turned[sides.face], backwards, where)]
 
 
+def _first_of_each(label: IntArray) -> IntArray:
+    """(k,) the first point of each of the labels 0..k-1."""
+    first = np.empty(int(label.max(initial=-1)) + 1, np.int64)
+    first[label[::-1]] = np.arange(len(label) - 1, -1, -1)  # what is written last stays
+    return first
+
+
 def _joining_notes(used: IntArray, label: IntArray) -> list[str]:
-    before, after = len(used), len(np.unique(label[used]))
+    """used: points, with repeats (np.unique of so many takes as long as all the rest)."""
+    is_used, is_left = np.zeros(len(label), bool), np.zeros(len(label), bool)
+    is_used[used] = is_left[label[used]] = True
+    before, after = np.count_nonzero(is_used), np.count_nonzero(is_left)
     return [f"{before} vertices lie at {after} positions; they were welded."] if after < before else []
 
 

@@ -47,13 +47,26 @@ class Sides:
     def edges(self) -> tuple[IntArray, IntArray]:
         """(h,) an index of the edge of each side, equal for equal ends; and (edges,) how many sides each has.
         Sides without two ends have an edge of their own kind, which counts 0."""
-        low, high = np.minimum(self.tail, self.head), np.maximum(self.tail, self.head)
-        _, edge, count = np.unique(
-            low * (int(high.max(initial=0)) + 1) + high, return_inverse=True, return_counts=True
-        )
-        edge = edge.reshape(-1)
-        count[edge[low == high]] = 0
+        from contact_core.geometry.side_kernels import number_edges
+
+        tail, head = np.ascontiguousarray(self.tail), np.ascontiguousarray(self.head)
+        points, sides = int(max(tail.max(initial=-1), head.max(initial=-1))) + 1, len(tail)
+        edge, count = np.empty(sides, np.int64), np.empty(sides, np.int64)
+        degree, first = np.zeros(points, np.int64), np.full(points, -1, np.int64)
+        link, far = np.empty(sides, np.int64), np.empty(sides, np.int64)
+        count = count[: number_edges(tail, head, degree, first, link, far, edge, count)]
+        count[edge[tail == head]] = 0
         return edge, count
+
+    @cached_property
+    def edge_ends(self) -> tuple[IntArray, IntArray]:
+        """(edges,) the first and the last side at each edge."""
+        edge, count = self.edges
+        first, last = np.empty(len(count), np.int64), np.empty(len(count), np.int64)
+        sides = np.arange(len(edge))
+        first[edge[::-1]] = sides[::-1]  # what is written last stays
+        last[edge] = sides
+        return first, last
 
 
 def open_sides(sides: Sides) -> IntArray:
@@ -113,12 +126,12 @@ def _round_edges(
 
 def face_normals(points: FloatArray, sides: Sides) -> FloatArray:
     """(f, 3) twice the vector area of each polygon (Newell)."""
-    count = int(sides.face.max(initial=-1)) + 1
-    first = np.full(count, -1)
-    first[sides.face[::-1]] = sides.tail[::-1]
-    corner = points[first[sides.face]]
-    cross = np.cross(points[sides.tail] - corner, points[sides.head] - corner)
-    return np.stack([np.bincount(sides.face, cross[:, k], count) for k in range(3)], axis=1)
+    from contact_core.geometry.side_kernels import vector_areas
+
+    area = np.zeros((int(sides.face.max(initial=-1)) + 1, 3))
+    face, tail, head = (np.ascontiguousarray(ids) for ids in (sides.face, sides.tail, sides.head))
+    vector_areas(points, face, tail, head, area)
+    return area
 
 
 def joined_points(count: int, sides: Sides, group: IntArray, pairs: IntArray) -> IntArray:

@@ -32,10 +32,7 @@ def wound_alike(sides: Sides, faces: int, own_edge: IntArray) -> Winding:
     A surface with one side is left against itself somewhere, at joined edges rather than at the file's own.
     """
     edge, count = sides.edges
-    order = np.argsort(edge, kind="stable")
-    starts = np.flatnonzero(np.diff(edge[order], prepend=-1))
-    starts = starts[count[edge[order[starts]]] == 2]
-    one, other = order[starts], order[starts + 1]
+    one, other = (side[count == 2] for side in sides.edge_ends)
     a, b = sides.face[one], sides.face[other]
     differ = (sides.tail[one] == sides.tail[other]) & (a != b)
     if not differ.any():
@@ -114,18 +111,13 @@ def _capped(
     points: FloatArray, sides: Sides, piece: IntArray, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(count,) signed volume of each piece with its holes closed by cones, its area, the area of those cones."""
-    of_side = piece[sides.face]
-    weight = np.maximum(np.bincount(of_side, minlength=count), 1)
-    centre = np.stack(
-        [np.bincount(of_side, points[sides.tail, k], count) / weight for k in range(3)], axis=1
-    )  # (pieces, 3)
+    from contact_core.geometry.side_kernels import volumes_of_pieces
+
     normal = face_normals(points, sides)
-    area = np.bincount(piece, np.linalg.norm(normal, axis=1), count)
-    first = np.full(len(piece), -1)
-    first[sides.face[::-1]] = sides.tail[::-1]
-    held = first >= 0
-    lever = points[first[held]] - centre[piece[held]]
-    volume = np.bincount(piece[held], (lever * normal[held]).sum(axis=1), count)
+    centre, volume, area = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
+    face, tail = np.ascontiguousarray(sides.face), np.ascontiguousarray(sides.tail)
+    volumes_of_pieces(points, face, tail, normal, piece, np.zeros(count), centre, volume, area)
+    of_side = piece[sides.face]
     edge, uses = sides.edges
     border = np.flatnonzero(uses[edge] == 1)
     if not len(border):

@@ -46,7 +46,7 @@ def world_from_manipulator(spec: ManipulatorSpec) -> FloatArray:
 
 def world_from_object(spec: ObjectSpec, mesh: TriangleMesh) -> FloatArray:
     """(4, 4) rigid: the object turned about the middle of its bounding box, which goes to `center`."""
-    used = mesh.points[np.unique(mesh.faces)]
+    used = mesh.points[mesh.used_points]
     middle = 0.5 * (used.min(axis=0) + used.max(axis=0))
     placed = _turned(spec.rotation)
     placed[:3, 3] = np.asarray(spec.center) - placed[:3, :3] @ middle

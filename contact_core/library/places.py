@@ -68,7 +68,7 @@ def main_axes(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     moment = np.einsum("f,fci,fcj->ij", areas, away, away)
     ways = np.linalg.eigh(moment)[1]
     ways[:, 2] = np.cross(ways[:, 0], ways[:, 1])
-    along = mesh.points[np.unique(mesh.faces)] @ ways
+    along = mesh.points[mesh.used_points] @ ways
     frame = np.eye(4)
     frame[:3, :3] = ways
     frame[:3, 3] = ways @ (0.5 * (along.min(axis=0) + along.max(axis=0)))

@@ -36,7 +36,7 @@ def camera_of(picture: Picture, aspect: float) -> Camera:
     if picture.focus is not None and len(picture.focus):
         points = np.asarray(picture.focus, float)  # (n, 3)
     else:
-        points = np.concatenate([item.mesh.points[np.unique(item.mesh.faces)] for item in picture.meshes])
+        points = np.concatenate([item.mesh.points[item.mesh.used_points] for item in picture.meshes])
     back = np.asarray(picture.camera_from or DEFAULT_FROM, float)
     back = back / np.linalg.norm(back)
     right = np.cross(np.asarray(picture.up, float), back)

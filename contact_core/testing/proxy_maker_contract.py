@@ -54,7 +54,7 @@ class ProxyMakerContract(Contract):
         none of the proxy leaves the mesh's box by more."""
         mesh = BROKEN[name]()
         proxy, most = maker.make(mesh, NO_PROGRESS), most_away * mesh.bounding_box_diagonal
-        used = mesh.points[np.unique(mesh.faces)]
+        used = mesh.points[mesh.used_points]
         assert np.quantile(Locator.of(proxy).closest(used).distance, 0.9) <= most
         assert (proxy.points >= used.min(axis=0) - most).all() and (proxy.points <= used.max(axis=0) + most).all()
 

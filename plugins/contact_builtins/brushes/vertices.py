@@ -21,7 +21,7 @@ class VertexBrush:
     def mark(self, gesture: BrushGesture) -> BrushMark:
         radius = radius_of(gesture)
         line = stroke_line(gesture, 0.25 * radius)
-        used = np.unique(gesture.mesh.faces)
+        used = gesture.mesh.used_points
         at = line.positions(gesture.mesh)
         box = ((gesture.mesh.points[used] - at.min(axis=0)) >= -radius).all(axis=1)
         box &= ((gesture.mesh.points[used] - at.max(axis=0)) <= radius).all(axis=1)

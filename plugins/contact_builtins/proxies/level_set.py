@@ -56,7 +56,7 @@ class LevelSetProxy(HasSettings):
             raise InvalidInput("a proxy needs a mesh with faces and an extent, but it has none.")
         offset = self.offset * mesh.bounding_box_diagonal
         cell = (self.cell or self.offset) * mesh.bounding_box_diagonal
-        used = mesh.points[np.unique(mesh.faces)]
+        used = mesh.points[mesh.used_points]
         margin = offset + 2.0 * cell
         low, high = used.min(axis=0) - margin, used.max(axis=0) + margin
         lattice = 2.2 * float(np.prod((high - low) / cell))
