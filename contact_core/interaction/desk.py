@@ -18,7 +18,7 @@ from contact_core.interaction.lock import Locks
 from contact_core.interaction.overlay import Handle, handle_under
 from contact_core.interaction.seen import Hit, SeenScene
 from contact_core.interaction.settings import InteractionSettings, Selection
-from contact_core.interaction.view import View
+from contact_core.interaction.view import View, shows
 from contact_core.plugins.registry import TOOLS, Slot
 from contact_core.proposals.draft import Draft
 from contact_core.solve.terms import PoseTerm
@@ -97,11 +97,18 @@ class Desk:
         )
         return self.scene.moved_since(before)
 
+    @property
+    def worked_on(self) -> str | None:
+        """The surface that tools work on, through all others; None for whatever is in front, and in a view that
+        does not show it."""
+        name = self.selection.surface
+        return name if name is not None and name in self.scene.surfaces and shows(self.view, name) else None
+
     def pick(self, pointer: Pointer, among: Iterable[str] | None = None) -> Hit | None:
         """What is under the pointer: on some surfaces, by default on that which tools work on, through all others,
         or on whatever is in front where there is none such."""
-        if among is None and self.selection.surface in self.scene.surfaces:
-            among = (str(self.selection.surface),)
+        if among is None and self.worked_on is not None:
+            among = (self.worked_on,)
         return self.scene.pick(self.view, pointer.pixel, among)
 
     def patch_at(self, hit: Hit, reach: float = 0.0) -> str | None:

@@ -41,9 +41,10 @@ class DocumentDrawing:
             if chosen:
                 along = shown.axis_points(patch.name)
                 line = lifted(seen, along)
-                axes.append(AxisLine(line, WHITE, patch=patch.name, arrow=True))
+                axes.append(AxisLine(line, WHITE, patch=patch.name, arrow=True, surface=patch.surface))
             if chosen and desk.settings.labels:
-                labels.append(Label(patch.name, seen.positions(shown.axis_points(patch.name)[0])[0], patch.color))
+                root = seen.positions(shown.axis_points(patch.name)[0])[0]
+                labels.append(Label(patch.name, root, patch.color, patch.surface))
         self._decals = {name: kept for name, kept in self._decals.items() if name in document.patches}
         return Overlay(tuple(decals), tuple(axes), pair_lines=self._pairs(document), labels=tuple(labels))
 

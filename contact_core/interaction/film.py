@@ -253,7 +253,7 @@ class FilmDesk:
                 if settings.first <= at <= settings.last:
                     still = session.scene_at(at)
                     ghosts += [
-                        Ghost(self._posed(still, name), session.rigs[name].faces, color, 0.4 / (k + 1))
+                        Ghost(self._posed(still, name), session.rigs[name].faces, color, 0.4 / (k + 1), name)
                         for name in session.rigs
                         if name in still.surfaces and name in self.desk.scene.surfaces
                     ]

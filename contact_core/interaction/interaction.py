@@ -81,6 +81,11 @@ class Interaction(Holding):
         """Whether a gesture is under way."""
         return self._gesture is not None
 
+    @property
+    def keeps_view(self) -> bool:
+        """Whether events of the pointer are for the view of the press, wherever the pointer goes."""
+        return self._gesture is not None and not self._gesture.crosses
+
     def handle(self, event: Event, view: View) -> bool:
         """Take an event, or leave it to the camera and the front end's own actions: whether it was taken.
 

@@ -239,8 +239,10 @@ class Lesson:
         if shown is None or self.number in self._done:
             return Overlay()
         points = shown[0]
-        label = Label(f"{STEPS[self.number].name}: drag along here", points[0], ACCENT)
-        return Overlay(axes=(AxisLine(points, ACCENT, 4.0, arrow=True),), labels=(label,))
+        mark = self._mark()
+        where = None if mark is None else self._surface_of(mark)
+        label = Label(f"{STEPS[self.number].name}: drag along here", points[0], ACCENT, where)
+        return Overlay(axes=(AxisLine(points, ACCENT, 4.0, arrow=True, surface=where),), labels=(label,))
 
     def _mark(self) -> Mark | None:
         """The mark of what comes next in this step."""

@@ -6,7 +6,8 @@ pointer. Sizes in pixels are of a plain screen: multiply by the view's `pixel_ra
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Collection
+from dataclasses import dataclass, fields, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -36,13 +37,15 @@ class Decal:
 
 @dataclass(frozen=True, eq=False)
 class AxisLine:
-    """A line on a surface: the axis of a patch, a link, what is being drawn. points: (k, 3) world, in order."""
+    """A line on a surface: the axis of a patch, a link, what is being drawn. points: (k, 3) world, in order.
+    surface: that on which it lies alone."""
 
     points: FloatArray
     color: Color = WHITE
     width: float = 2.0
     patch: str | None = None
     arrow: bool = False
+    surface: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,21 +88,23 @@ class BrushRing:
 @dataclass(frozen=True, eq=False)
 class Ghost:
     """Something that is not there yet: a posed hand that is proposed, a copy before it is made. points: (n, 3)
-    world. triangles: (t, 3); a ghost without is drawn as dots."""
+    world. triangles: (t, 3); a ghost without is drawn as dots. surface: which it is a ghost of."""
 
     points: FloatArray
     triangles: IntArray
     color: Color
     opacity: float = 0.35
+    surface: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """Text at a place. position: (3,) world."""
+    """Text at a place. position: (3,) world. surface: on which that is."""
 
     text: str
     position: FloatArray
     color: Color = WHITE
+    surface: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +152,24 @@ class Overlay:
         kinds = [each.name for each in fields(self) if each.name != "tint"]
         return Overlay(**{name: getattr(self, name) + getattr(other, name) for name in kinds},
                        tint=other.tint or self.tint)  # fmt: skip
+
+    def on(self, surfaces: Collection[str], *, pointed: bool) -> Overlay:
+        """What is drawn in a view that shows these surfaces alone: no pairs, and what belongs to no surface (the
+        brush, handles) only where the pointer is."""
+
+        def here(each: Decal | AxisLine | Ghost | Label) -> bool:
+            return pointed if each.surface is None else each.surface in surfaces
+
+        return replace(
+            self,
+            decals=tuple(filter(here, self.decals)),
+            axes=tuple(filter(here, self.axes)),
+            ghosts=tuple(filter(here, self.ghosts)),
+            labels=tuple(filter(here, self.labels)),
+            pair_lines=(),
+            handles=self.handles if pointed else (),
+            rings=self.rings if pointed else (),
+        )
 
 
 NOTHING = Overlay()

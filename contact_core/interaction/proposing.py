@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from contact_core.document.document import ContactDocument
@@ -18,6 +18,7 @@ from contact_core.solve.terms import paper_terms
 
 if TYPE_CHECKING:
     from contact_core.grasping.finishing import Suggestion
+    from contact_core.grasping.scene import GraspScene
     from contact_core.interaction.desk import Desk
     from contact_core.proposals.proposal import Proposal, SolveSettings
 
@@ -83,16 +84,21 @@ class Proposing:
         shown when it comes. Raises CommandRejected where it is not clear which are meant, InvalidInput."""
         from contact_core.grasping.searching import GraspSettings
         from contact_core.grasping.suggest import suggest
-        from contact_core.grasping.verbs import grasp_scene_of
 
         desk, plugins = self._desk, self._desk.session.plugins
-        scene = grasp_scene_of(desk.session, self._meant(hand=True), self._meant(hand=False))
+        scene = self.scene_of_those_meant()
         sampler = plugins.name_for(GRASP_SAMPLERS, "grasp")
         settings = GraspSettings(
             desk.settings.suggestions, sampler=sampler, sampler_settings=desk.given(GRASP_SAMPLERS, sampler)
         )
         self.dismiss()
         self._worker.begin_some(_SUGGEST, lambda progress: suggest(scene(), settings, progress), self._take)
+
+    def scene_of_those_meant(self) -> Callable[[], GraspScene]:
+        """`grasp_scene_of` for the hand and the object that are meant. Raises CommandRejected, InvalidInput."""
+        from contact_core.grasping.verbs import grasp_scene_of
+
+        return grasp_scene_of(self._desk.session, self._meant(hand=True), self._meant(hand=False))
 
     def _meant(self, hand: bool) -> str:
         """The hand, or the object, that is selected: by itself, by the active patch, or as the only one."""
@@ -117,6 +123,11 @@ class Proposing:
         self.suggestions += (found,)
         if self.proposal is None:
             self.show(found.proposal)
+
+    def take(self, found: Sequence[Suggestion]) -> None:
+        """Show the first of several that came at once. Raises CommandRejected where the document has changed."""
+        for one in found:
+            self._take(one)
 
     def step(self, by: int) -> None:
         """Show the suggestion that comes `by` places after that which is shown, round and round.
@@ -191,5 +202,6 @@ class Proposing:
         before = desk.scene.following(desk.base, session.derived.known_meshes, session.rigs, desk.hidden)
         moved = before.moved_since(desk.scene) & before.surfaces.keys()
         return Overlay(ghosts=tuple(
-            Ghost(before.surfaces[name].points, before.surfaces[name].mesh.faces, _GHOST) for name in sorted(moved)
+            Ghost(before.surfaces[name].points, before.surfaces[name].mesh.faces, _GHOST, surface=name)
+            for name in sorted(moved)
         ))  # fmt: skip

@@ -18,7 +18,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.transform import transform_points
-from contact_core.interaction.view import View
+from contact_core.interaction.view import View, shows
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
 from contact_core.scene.problem import world_from_surface
 
@@ -122,11 +122,12 @@ class SeenScene:
         return frozenset(n for n in names if self.surfaces.get(n) is not other.surfaces.get(n))
 
     def pick(self, view: View, pixel: FloatArray, among: Iterable[str] | None = None) -> Hit | None:
-        """What the ray through a pixel (2,) meets first, on some of the surfaces: through all others."""
+        """What the ray through a pixel (2,) meets first, on some of the surfaces that the view shows: through all
+        others."""
         best: Hit | None = None
         for name in self.surfaces if among is None else among:
             seen = self.surfaces.get(name)
-            if seen is None or not len(seen.mesh.faces):
+            if seen is None or not len(seen.mesh.faces) or not shows(view, name):
                 continue
             found = Locator.of(seen.mesh).cast(*seen.rays_of(view, pixel[None]))
             distance = float(found.distance[0])

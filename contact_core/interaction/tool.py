@@ -7,7 +7,7 @@ release together with the pose that follows, or puts everything back: no tool ca
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 from contact_core.interaction.overlay import NOTHING, Overlay
 
@@ -20,8 +20,11 @@ class Gesture:
     """What goes on between press and release. Derive from it.
 
     What these methods raise as a ContactError is shown to the artist. In `move` the preview before stays; in
-    `release` nothing is committed.
+    `release` nothing is committed. crosses: whether it goes on in another view where the pointer goes there; else
+    the view of the press keeps the pointer to the end.
     """
+
+    crosses: ClassVar[bool] = False
 
     def move(self, pointer: Pointer) -> None:
         """The pointer moved with the button held: replace the preview, from the document at the press."""

@@ -6,6 +6,7 @@ The world is the scene in units of `Interaction.meters_per_unit`. All of this is
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -94,6 +95,13 @@ class Perspective:
         slope = self._focal / np.where(depth > 1e-12, depth, 1e-12)
         x, y = 0.5 * self.viewport[0] + slope * seen[:, 0], 0.5 * self.viewport[1] - slope * seen[:, 1]
         return np.stack([x, y, depth], axis=1)
+
+
+def shows(view: View, surface: str) -> bool:
+    """Whether a view shows a surface. It shows all, unless it names those that it shows in an attribute `surfaces`,
+    as one half of a split view does: what it does not show cannot be picked in it either."""
+    only: Collection[str] | None = getattr(view, "surfaces", None)
+    return only is None or surface in only
 
 
 def world_per_pixel(view: View, point: FloatArray) -> float:

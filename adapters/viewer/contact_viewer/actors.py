@@ -275,21 +275,21 @@ class CornerTexts:
             look.SetBackgroundColor(*theme.bottom)
             look.SetBackgroundOpacity(opacity)
 
-    def write(self, top: str, bottom: str, middle: str, eye: Eye) -> None:
-        """Put texts up; an empty one takes its own away."""
-        width, height = eye.viewport
-        margin = 12 * eye.pixel_ratio
+    def write(self, top: str, bottom: str, middle: str, size: tuple[int, int], ratio: float) -> None:
+        """Put texts up in a window of so many pixels; an empty one takes its own away."""
+        width, height = size
+        margin = 12 * ratio
         letters = max(map(len, middle.splitlines()), default=0)
-        left = max(margin, width / 2 - 0.3 * letters * 13 * eye.pixel_ratio)  # a letter of Courier is 0.6 wide
+        left = max(margin, width / 2 - 0.3 * letters * 13 * ratio)  # a letter of Courier is 0.6 wide
         places = ((margin, height - margin), (margin, margin), (left, height / 2))
-        for actor, text, (x, y), size in zip(
+        for actor, text, (x, y), letter in zip(
             self._actors, (top, bottom, middle), places, (14, 14, 13), strict=True
         ):
             actor.SetVisibility(bool(text))
             actor.SetInput(text)
             actor.SetPosition(x, y)
             look = actor.GetTextProperty()
-            look.SetFontSize(round(size * eye.pixel_ratio))
+            look.SetFontSize(round(letter * ratio))
             look.SetVerticalJustification(2 if actor is self._actors[0] else 1 if actor is self._actors[2] else 0)
 
 

@@ -8,31 +8,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from contact_core.document.document import named
-from contact_core.errors import ContactError, InvalidInput
+from contact_core.errors import CommandRejected, ContactError, InvalidInput
 from contact_core.interaction.actions import Action, action_of
 from contact_core.interaction.events import Event, Pointer
 from contact_core.interaction.interaction import Interaction
-from contact_core.opening import DOCUMENT_SUFFIX
 from contact_core.plugins.manager import PluginManager
-from contact_core.scene.memory_scene import save_scene
 from contact_core.session import Session
 from contact_viewer import files, panel
 from contact_viewer.canvas import Canvas
 from contact_viewer.drawer import Drawer
+from contact_viewer.file_actions import FileActions
 from contact_viewer.guide import Guide
 from contact_viewer.host import ViewerHost
 from contact_viewer.look import THEMES
 from contact_viewer.navigation import Navigation
+from contact_viewer.panes import Panes
 from contact_viewer.recovery import Recovery, state_directory
+from contact_viewer.shelves import Shelves
 from contact_viewer.tree import TreeActions
 
+Want: TypeAlias = Literal["open", "export", "library"]
 _SIDES = {"view.front": "front", "view.side": "right", "view.top": "top"}
 
 
-class Application(TreeActions):
+class Application(TreeActions, FileActions):
     """What an artist has before them.
 
     sources: as for `files.open_files`. notes: sentences on what opening found, and what the last action did.
@@ -46,22 +48,22 @@ class Application(TreeActions):
         *,
         state_folder: Path | None = None,
     ) -> None:
-        self.canvas = canvas
+        self.canvas, self.panes = canvas, Panes(canvas)
         self.plugins = plugins or PluginManager()
         self.notes: list[str] = []
         self.help_wanted = False
-        self.wants: str | None = None  # "open" or "export": a file that the artist is to name
+        self.wants: Want | None = None  # what the artist is to name
         self._state_folder = state_folder
-        self._path: Path | None = None
         self._session: Session | None = None
         self._interaction: Interaction | None = None
-        self._navigation = Navigation(canvas.eye)
+        self._navigation = Navigation()
         self._camera_moved = True
         self._told = False
         self.guide = Guide(state_folder or state_directory())
         self._filmed = False
         self.film_open = False  # whether a timeline is shown, for which the film is measured
         self._meets: list[panel.Residual] = []
+        self.shelves = Shelves(self, state_folder)
         self.open(list(sources))
         if not sources and self.guide.is_new and not self.session.document.patches:
             self.turn_tutorial()
@@ -117,7 +119,8 @@ class Application(TreeActions):
         self._session = session
         self._interaction = Interaction(session, meters_per_unit=meters)
         self._recovery.follow(session)
-        self.drawer = Drawer(self._interaction, self.canvas, self.guide.overlay)
+        self.panes.join()
+        self.drawer = Drawer(self._interaction, self.panes, self.guide.overlay)
         self.canvas.keep_surfaces(())
         self.see_all()
         self._interaction.prepare()
@@ -139,10 +142,14 @@ class Application(TreeActions):
 
         What is refused stands in `line`.
         """
-        if self.interaction.handle(event, self.canvas.eye):
+        eye = self.panes.active.eye
+        if isinstance(event, Pointer):
+            stays = self.interaction.keeps_view or self._navigation.is_dragging
+            event, eye = self.panes.local(event, stays=stays)
+        if self.interaction.handle(event, eye):
             return
         if isinstance(event, Pointer):
-            self._camera_moved |= self._navigation.handle(event)
+            self._camera_moved |= self._navigation.handle(event, eye)
             return
         action = action_of(event, self.interaction.actions)
         if action is not None and action.by_host:
@@ -170,15 +177,17 @@ class Application(TreeActions):
             "show.card_before": lambda: self.turn_card("back"),
             "file.open": lambda: self._ask("open"),
             "file.export": lambda: self._ask("export"),
+            "file.library": lambda: self._ask("library"),
             "file.save": self.save,
             "pose.key": self.key_pose,
             "pose.next": lambda: self.step_key(+1),
             "pose.previous": lambda: self.step_key(-1),
             "view.home": self.see_all,
             "view.selection": self.see_selection,
+            "view.split": self.split,
         }
         if action in _SIDES:
-            self.canvas.eye.look_from(_SIDES[action])
+            self.panes.active.eye.look_from(_SIDES[action])
             self._camera_moved = True
         elif action in own:
             own[action]()
@@ -209,7 +218,7 @@ class Application(TreeActions):
     def _redraw(self) -> None:
         self.drawer.stale = self._told = True
 
-    def _ask(self, what: str) -> None:
+    def _ask(self, what: Want) -> None:
         self.wants, self._told = what, True
 
     def attempt(self, act: Callable[[], object]) -> None:
@@ -220,61 +229,51 @@ class Application(TreeActions):
         except ContactError as error:
             self.say(str(error))
 
-    # -- files ---------------------------------------------------------------------------------------------------
-
-    @property
-    def title(self) -> str:
-        """What is open, for the title of a window."""
-        path = getattr(self.session.host, "path", None) or self._path
-        name = path.name if path is not None else "untitled"
-        return f"{name}{'' if self.session.history.is_clean else ' •'}"
-
-    def save(self, path: Path | str | None = None) -> None:
-        """Save where it came from, or at a path. Raises FileRefused."""
-        target = None if path is None else Path(path)
-        if target is None and isinstance(self.session.host, ViewerHost) and self.session.host.path is None:
-            target = files.free_path(self._path)
-        saved = files.save(self.session, target)
-        self._path = saved
-        self._recovery.forget()
-        self.say(f"saved {saved}.")
-
-    def write(self, path: Path) -> None:
-        """Save under another name, or export, as the suffix says. Raises FileRefused."""
-        if path.suffix.lower() in (files.SCENE_SUFFIX, DOCUMENT_SUFFIX):
-            self.save(path)
-        else:
-            self.export(path)
-
-    def write_copy(self, path: Path) -> None:
-        """Write the scene or an export somewhere, and go on as before. Raises FileRefused."""
-        host = self.session.host
-        if path.suffix.lower() == files.SCENE_SUFFIX and isinstance(host, ViewerHost):
-            save_scene(host.scene, path)
-        else:
-            files.export(self.session, path)
-
-    def export(self, path: Path | str) -> None:
-        """Write the posed scene. Raises FileRefused."""
-        files.export(self.session, Path(path))
-        self.say(f"wrote {path}.")
-
     # -- what is seen --------------------------------------------------------------------------------------------
 
     def see_all(self) -> None:
         """Bring everything into view."""
-        self.canvas.eye.fit(self.drawer.points())
+        for pane in self.panes.all:
+            pane.eye.fit(self.drawer.points(eye=pane.eye))
         self._camera_moved = True
 
     def see_selection(self) -> None:
         """Bring the selected patches into view, everything where none is."""
-        points = self.drawer.points(self.interaction.selection.patches)
-        self.canvas.eye.fit(points, margin=3.0 if self.interaction.selection.patches else 1.12)
+        document, chosen = self.session.document, self.interaction.selection.patches
+        for pane in self.panes.all:
+            here = tuple(name for name in chosen if pane.eye.shows(document.patch(name).surface))
+            pane.eye.fit(self.drawer.points(here, pane.eye), margin=3.0 if here else 1.12)
         self._camera_moved = True
+
+    def split(self) -> None:
+        """The hands at the left and everything else at the right, each with a camera; or one view again. Raises
+        CommandRejected where one of them is missing."""
+        if self.panes.is_split:
+            self.panes.join()
+        else:
+            hands, things = self._halves()
+            if not hands or not things:
+                raise CommandRejected(
+                    "a split view shows a hand and an object, but one of them is missing: open it."
+                )
+            self.panes.split(hands, things)
+        self.drawer.anew()
+        self.see_all()
+
+    def _halves(self) -> tuple[frozenset[str], frozenset[str]]:
+        """The surfaces at the left and at the right of a split view."""
+        scene, rigs = self.interaction.desk.scene.surfaces.keys(), self.session.rigs.keys()
+        return frozenset(scene & rigs), frozenset(scene - rigs)
+
+    def resize(self, width: int, height: int, ratio: float | None = None) -> bool:
+        """The view has another size, in pixels of which `ratio` are one of the screen's own; whether it has."""
+        changed = self.panes.resize(width, height, ratio)
+        self.drawer.stale |= changed
+        return changed
 
     def set_theme(self, name: str) -> None:
         """dark or light."""
-        self.canvas.set_theme(THEMES[name])
+        self.panes.set_theme(THEMES[name])
         self.drawer.stale = True
 
     # -- time ----------------------------------------------------------------------------------------------------
@@ -336,6 +335,8 @@ class Application(TreeActions):
             self._redraw()
         if self.film_open and not self.interaction.is_busy and not self.interaction.film.playback.is_playing:
             self.interaction.film.measure()
+        if self.panes.is_split:
+            self.panes.show(*self._halves())
         parts = self.drawer.follow()
         if self._filmed:
             parts |= {"film"}

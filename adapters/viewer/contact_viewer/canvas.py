@@ -53,14 +53,19 @@ class Canvas:
     """Draws in a vtkRenderWindow. `eye` is its camera.
 
     sized: whether `resize` says how large the window is; one on the screen is as large as its user makes it.
+    `beside`: another canvas of the same window, which is drawn with this one. `share`: the part of the window's
+    width that it draws in.
     """
+
+    beside: Canvas | None = None
+    share = (0.0, 1.0)
 
     def __init__(self, window: Any, *, up: str = "Y", theme: Theme = DARK, sized: bool = True) -> None:
         from vtkmodules.vtkRenderingCore import vtkRenderer
 
         self.window = window
         self._base, self._above = vtkRenderer(), vtkRenderer()
-        window.SetNumberOfLayers(2)
+        window.SetNumberOfLayers(max(2, window.GetNumberOfLayers()))
         window.AddRenderer(self._base)
         self._above.SetLayer(1)
         self._above.InteractiveOff()
@@ -70,14 +75,14 @@ class Canvas:
         self._base.SetGradientBackground(True)
         _light(self._base)
         self.eye = Eye(self._base, up=up)
-        self.eye.viewport = tuple(window.GetSize())
+        self.eye.viewport = self._size = tuple(window.GetSize())
         self._surfaces: dict[str, SurfaceActor] = {}
         self._fills: dict[str, FillActor] = {}
         self._lines = LineActors(self._base, in_front=True)  # where nothing lies before them
         self._hidden = LineActors(self._above)  # and through everything, faintly
         self._dots = DotActors(self._above)
         self._words = WordActors(self._above)
-        self._texts = CornerTexts(self._above)
+        self._texts: CornerTexts | None = None
         self._software: bool | None = None
         self._overlay = Overlay()
         self._sized = sized
@@ -93,11 +98,26 @@ class Canvas:
         self._base.SetBackground(*theme.bottom)
         self._base.SetBackground2(*theme.top)
         self._words.shade, self._words.ink = theme.bottom, theme.ink
-        self._texts.set_theme(theme)
+        if self._texts is not None:
+            self._texts.set_theme(theme)
 
     def write(self, top: str, bottom: str, middle: str = "") -> None:
         """Lines of text at the top and the bottom, and a table over the middle; for windows without panels."""
-        self._texts.write(top, bottom, middle, self.eye)
+        if self._texts is None:
+            self._texts = CornerTexts(self._whole_window())
+            self._texts.set_theme(self.theme)
+        self._texts.write(top, bottom, middle, self._size, self.eye.pixel_ratio)
+
+    def _whole_window(self) -> Any:
+        """A renderer over all others, whatever their shares are."""
+        from vtkmodules.vtkRenderingCore import vtkRenderer
+
+        renderer = vtkRenderer()
+        renderer.SetLayer(2)
+        renderer.InteractiveOff()
+        self.window.SetNumberOfLayers(3)
+        self.window.AddRenderer(renderer)
+        return renderer
 
     # -- what is shown -------------------------------------------------------------------------------------------
 
@@ -186,10 +206,11 @@ class Canvas:
     def render(self, *, still: bool = False, quick: bool = False) -> None:
         """Draw one frame. still: with smooth edges, at leisure. quick: things move, so that where the processor
         draws, and slowly, fewer pixels have to do."""
-        self.eye.clip()
         self._sharpen(smooth=still or self._software is False)
         self._set_detail(self._quick_detail() if quick else 1.0)
-        self._words.place(self.eye, self._detail)
+        for pane in filter(None, (self, self.beside)):
+            pane.eye.clip()
+            pane._words.place(pane.eye, self._detail or 1.0)
         start = time.perf_counter()
         self.window.Render()
         if self._software is None:  # a window knows once it has drawn
@@ -215,13 +236,25 @@ class Canvas:
 
     def resize(self, width: int, height: int) -> None:
         """Another size of the view, pixels."""
-        self.eye.viewport = (max(10, width), max(10, height))
+        self._size = (max(10, width), max(10, height))
         self._detail = 0.0  # unlike any: the next frame sets the size of the window
         self._seconds = None
+        for pane in filter(None, (self, self.beside)):
+            pane.set_share(*pane.share, self._size)
+
+    def set_share(self, left: float, right: float, size: tuple[int, int]) -> None:
+        """Draw in a part of a window of so many pixels: shares of its width; nothing where the two are one."""
+        self.share = (left, right)
+        ends = [round(part * size[0]) for part in self.share]
+        self.eye.viewport = (max(10, ends[1] - ends[0]), size[1])
+        for renderer in (self._base, self._above):
+            renderer.SetViewport(ends[0] / size[0], 0.0, ends[1] / size[0], 1.0)
+            renderer.SetDraw(left < right)
 
     def _sharpen(self, *, smooth: bool) -> None:
         """Smooth edges: by samples where a graphics card draws, by a filter (FXAA) where the processor does."""
-        self._base.SetUseFXAA(smooth and self._software is not False)
+        for pane in filter(None, (self, self.beside)):
+            pane._base.SetUseFXAA(smooth and self._software is not False)
         samples = _SAMPLES if smooth and self._software is False else 0
         if self.window.GetMultiSamples() != samples:
             self.window.SetMultiSamples(samples)
@@ -238,9 +271,11 @@ class Canvas:
         if detail == self._detail or not self._sized:
             return
         self._detail = detail
-        width, height = self.eye.viewport
+        width, height = self._size
         self.window.SetSize(max(8, round(width * detail)), max(8, round(height * detail)))
-        self.show(self._overlay)
+        for pane in filter(None, (self, self.beside)):
+            pane._detail = detail
+            pane.show(pane._overlay)
 
     def close(self) -> None:
         """Let go of what the graphics driver holds."""

@@ -23,13 +23,14 @@ class Eye:
 
     up: the axis of the scene that stays upright, "X", "Y" or "Z". viewport: width and height of the view, pixels;
     the image that is drawn may have fewer while things move. pixel_ratio: pixels for one of the screen's own units,
-    2 on most laptops.
+    2 on most laptops. surfaces: those that it shows alone; None for all.
     """
 
     def __init__(self, renderer: Any, *, up: str = "Y") -> None:
         self._renderer = renderer
         self._camera = renderer.GetActiveCamera()
         self._camera.SetViewAngle(FIELD_OF_VIEW)
+        self.surfaces: frozenset[str] | None = None
         self.pixel_ratio = 1.0
         self.viewport = (1280, 720)
         self.up = up
@@ -83,6 +84,10 @@ class Eye:
     def pixel_size(self, point: Any) -> float:
         """How long a pixel of the image is at a world point (3,)."""
         return self._pixel_at_one * max(float((np.asarray(point, float) - self.eye) @ self.direction), 1e-12)
+
+    def shows(self, surface: str) -> bool:
+        """Whether a surface is seen here."""
+        return self.surfaces is None or surface in self.surfaces
 
     @property
     def _pixel_at_one(self) -> float:
@@ -145,6 +150,10 @@ class Eye:
     def look_from_point(self, eye: FloatArray, focus: FloatArray) -> None:
         """Look from a point to another, both (3,) world."""
         self._place(np.asarray(eye, float), np.asarray(focus, float))
+
+    def look_along(self, other: Eye) -> None:
+        """Look as another does."""
+        self._place(other.eye, np.array(other._camera.GetFocalPoint()))
 
     def fit(self, points: Any, *, margin: float = 1.12) -> None:
         """Keep the direction, and see all of the points (k, 3); k = 0 changes nothing."""

@@ -206,6 +206,15 @@ def _within_folder(source: str) -> str:
     return str(scenes[0])
 
 
+def scenes_of(sources: Sequence[str], plugins: PluginManager) -> list[str]:
+    """Those that are opened in place of what is there: scenes, documents, folders of a result."""
+    return [
+        source
+        for source in sources
+        if Path(source).is_dir() or source.lower().endswith(DOCUMENT_SUFFIX) or _is_scene(source, plugins)
+    ]
+
+
 def _is_scene(source: str, plugins: PluginManager) -> bool:
     suffix = Path(source).suffix.lower()
     return any(suffix in host.suffixes for host in plugins.offers(HOSTS).values())

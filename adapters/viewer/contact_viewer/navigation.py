@@ -15,10 +15,9 @@ _ZOOM = 60.0  # pixels for a notch
 
 
 class Navigation:
-    """Moves an eye."""
+    """Moves the eye that an event is for."""
 
-    def __init__(self, eye: Eye) -> None:
-        self._eye = eye
+    def __init__(self) -> None:
         self._drag: Callable[[float, float], None] | None = None
         self._at = (0.0, 0.0)
 
@@ -27,14 +26,14 @@ class Navigation:
         """Whether the camera follows the pointer now."""
         return self._drag is not None
 
-    def handle(self, event: Pointer) -> bool:
+    def handle(self, event: Pointer, eye: Eye) -> bool:
         """Take an event; whether the camera moved."""
         before, self._at = self._at, (event.x, event.y)
         if event.kind == "wheel":
-            self._eye.zoom(event.wheel, event.pixel)
+            eye.zoom(event.wheel, event.pixel)
             return True
         if event.kind == "press":
-            self._drag = self._choose(event)
+            self._drag = self._choose(event, eye)
         elif event.kind in ("release", "leave"):
             self._drag = None
         elif self._drag is not None:
@@ -42,12 +41,12 @@ class Navigation:
             return True
         return False
 
-    def _choose(self, event: Pointer) -> Callable[[float, float], None]:
-        if event.button == "right":
-            return self._pull if event.holds("ctrl") else self._eye.pan
-        if event.holds("shift"):
-            return self._eye.pan
-        return self._pull if event.button == "middle" and event.holds("ctrl") else self._eye.orbit
+    def _choose(self, event: Pointer, eye: Eye) -> Callable[[float, float], None]:
+        def pull(_: float, dy: float) -> None:
+            eye.zoom(-dy / (_ZOOM * eye.pixel_ratio))
 
-    def _pull(self, _: float, dy: float) -> None:
-        self._eye.zoom(-dy / (_ZOOM * self._eye.pixel_ratio))
+        if event.button == "right":
+            return pull if event.holds("ctrl") else eye.pan
+        if event.holds("shift"):
+            return eye.pan
+        return pull if event.button == "middle" and event.holds("ctrl") else eye.orbit

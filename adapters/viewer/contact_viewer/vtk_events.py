@@ -21,10 +21,20 @@ _KEYS = {
 
 
 class VtkEvents:
-    """Listens to an interactor. handle: takes each event. errors: what handling raised."""
+    """Listens to an interactor. handle: takes each event. errors: what handling raised.
 
-    def __init__(self, interactor: Any, handle: Callable[[Event], None]) -> None:
-        self._interactor, self._handle = interactor, handle
+    typed: asked first with the name of each key and the letter that it writes; whether it took the key. dropped:
+    gets the files that were let go over the window.
+    """
+
+    def __init__(
+        self,
+        interactor: Any,
+        handle: Callable[[Event], None],
+        typed: Callable[[str, str], bool] = lambda key, letter: False,
+        dropped: Callable[[list[str]], None] = lambda files: None,
+    ) -> None:
+        self._interactor, self._handle, self._typed, self._dropped = interactor, handle, typed, dropped
         self.errors: list[BaseException] = []
         interactor.SetInteractorStyle(None)  # nothing of VTK's own: no w for wireframe, no q that ends it
         for side, button in _BUTTONS.items():
@@ -35,6 +45,7 @@ class VtkEvents:
         self._on("MouseWheelForwardEvent", self._pointer("wheel", wheel=1.0))
         self._on("MouseWheelBackwardEvent", self._pointer("wheel", wheel=-1.0))
         self._on("KeyPressEvent", self._key)
+        self._listen_for_files()
 
     def raise_errors(self) -> None:
         """Raise the first error that was collected."""
@@ -52,6 +63,19 @@ class VtkEvents:
 
         self._interactor.AddObserver(event, observe, _PRIORITY)
 
+    def _listen_for_files(self) -> None:
+        from vtkmodules.util.vtkConstants import VTK_OBJECT
+
+        def observe(_: object, __: object, names: Any) -> None:
+            try:
+                self._dropped([names.GetValue(place) for place in range(names.GetNumberOfValues())])
+            except BaseException as error:
+                self.errors.append(error)
+
+        told: Any = observe
+        told.CallDataType = VTK_OBJECT  # what VTK hands over with the event
+        self._interactor.AddObserver("DropFilesEvent", told, _PRIORITY)
+
     def _pointer(
         self, kind: PointerKind, button: Button = "none", wheel: float = 0.0
     ) -> Callable[[], Event | None]:
@@ -66,6 +90,8 @@ class VtkEvents:
 
     def _key(self) -> Event | None:
         symbol = self._interactor.GetKeySym() or ""
+        if self._typed(symbol, (self._interactor.GetKeyCode() or "").strip("\0")):
+            return None
         name = _KEYS.get(symbol, symbol.removeprefix("KP_"))
         if len(name) != 1 and name not in KEY_NAMES:
             return None

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.interaction.actions import GROUPS
 from contact_core.interaction.heat import legend_text
 from contact_core.plugins.manager import PluginManager
@@ -15,6 +17,7 @@ from contact_viewer import panel
 from contact_viewer.application import Application
 from contact_viewer.canvas import Canvas
 from contact_viewer.gl import has_screen, screen_window
+from contact_viewer.prompt import Prompt, paths
 from contact_viewer.vtk_events import VtkEvents
 
 _SIZE = (1280, 800)
@@ -28,14 +31,15 @@ class Front:
 
     def __init__(self, app: Application, interactor: Any) -> None:
         self.app = app
-        self.events = VtkEvents(interactor, app.handle)
+        self.events = VtkEvents(interactor, app.handle, self._typed, self._dropped)
+        self.prompt: Prompt | None = None
         self._interactor = interactor
         self._quiet = 0
 
     def tick(self) -> bool:
         """One turn of the loop: handle what is due and draw; whether something was drawn."""
-        app, size = self.app, tuple(self._interactor.GetRenderWindow().GetSize())
-        resized, app.canvas.eye.viewport = size != app.canvas.eye.viewport, size
+        app = self.app
+        resized = app.resize(*self._interactor.GetRenderWindow().GetSize())
         self._ask()
         parts = app.frame()
         if parts or resized:
@@ -65,18 +69,48 @@ class Front:
             self._interactor.TerminateApp()
 
     def _ask(self) -> None:
-        """Files: a plain window has no dialogs."""
+        """What the artist is to name is typed: a plain window has no dialogs."""
         wanted, self.app.wants = self.app.wants, None
+        app, here = self.app, f"{Path.cwd()}{os.sep}"
         if wanted == "open":
-            self.app.say(
-                "name files at the start, contact view FILE ..., or leave --window out to choose them here."
-            )
+            self.prompt = Prompt("Open, with ; between several", lambda text: app.bring(_each(text)), paths, here)
         elif wanted == "export":
-            self.app.attempt(lambda: self.app.export(self._export_path()))
+            write = Prompt("Write a scene, glb or usda", lambda text: app.write(Path(_each(text)[0])), paths)
+            self.prompt = replace(write, text=str(self._export_path()))
+        elif wanted == "library":
+            self.prompt = Prompt(
+                "A grasp of the library, or + and a name to save this one",
+                self._take_grasp,
+                app.shelves.names,
+            )
+
+    def _take_grasp(self, text: str) -> None:
+        if text.startswith("+"):
+            name, _, tags = text[1:].partition(",")
+            self.app.shelves.save(name, tags)
+        else:
+            self.app.shelves.apply_best(text)
+
+    def _typed(self, key: str, letter: str) -> bool:
+        """A key for the prompt, where there is one."""
+        prompt = self.prompt
+        if prompt is None:
+            return False
+
+        def take() -> None:
+            self.prompt = None  # what is done with the text may ask for more
+            if prompt.take(key, letter):
+                self.prompt = prompt
+
+        self.app.attempt(take)
+        self.app.drawer.stale = True
+        return True
+
+    def _dropped(self, names: list[str]) -> None:
+        self.app.attempt(lambda: self.app.bring(names))
 
     def _export_path(self) -> Path:
-        host = self.app.session.host
-        opened = getattr(host, "path", None)
+        opened = getattr(self.app.session.host, "path", None)
         return (opened or Path.cwd() / "contacts").with_suffix(".glb")
 
     def _show_texts(self) -> None:
@@ -89,7 +123,17 @@ class Front:
         line = " · ".join(part for part in (app.line(), app.refusal()) if part)
         if app.guide.lesson is not None:
             top = [wrapped(app.guide.text())]
-        app.canvas.write(" · ".join(top), line, help_text(app) if app.help_wanted else "")
+        help_ = help_text(app) if app.help_wanted else ""
+        app.canvas.write(" · ".join(top), line, self.prompt.shown() if self.prompt is not None else help_)
+
+
+def _each(text: str) -> list[str]:
+    """The files of a text, with ; between them. Raises InvalidInput for none."""
+    named = [str(Path(each.strip()).expanduser()) if not each.strip().startswith("sample:") else each.strip()
+             for each in text.split(";") if each.strip()]  # fmt: skip
+    if not named:
+        raise InvalidInput("name a file to open.")
+    return named
 
 
 def wrapped(text: str, width: int = 84) -> str:

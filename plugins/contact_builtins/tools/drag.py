@@ -12,6 +12,7 @@ from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import NOTHING, Handle, Overlay
 from contact_core.interaction.seen import Hit, SeenSurface
 from contact_core.interaction.tool import Gesture
+from contact_core.interaction.view import shows
 
 
 class Drag(Gesture):
@@ -89,10 +90,10 @@ def axis_handles(desk: Desk, patch: str) -> tuple[tuple[int, Handle], ...]:
 
 
 def _worked_on(desk: Desk, patch: str) -> SeenSurface | None:
-    """The surface of a patch; None where it is not loaded, or where tools work on another. A patch and what it
-    meets lie in one place, so a handle of the one would take presses that are meant for the other."""
+    """The surface of a patch; None where it is not loaded or shown, or where tools work on another. A patch and
+    what it meets lie in one place, so a handle of the one would take presses that are meant for the other."""
     name = desk.document.patch(patch).surface
-    return desk.scene.surfaces.get(name) if desk.selection.surface in (None, name) else None
+    return desk.scene.surfaces.get(name) if shows(desk.view, name) and desk.worked_on in (None, name) else None
 
 
 def shown_handles(desk: Desk) -> Overlay:

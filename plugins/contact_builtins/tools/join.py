@@ -19,7 +19,9 @@ from contact_core.interaction.tool import Gesture
 
 
 class Joining(Gesture):
-    """A line from the first patch to the pointer; what it ends on decides."""
+    """A line from the first patch to the pointer; what it ends on decides, in another view as well."""
+
+    crosses: ClassVar[bool] = True
 
     def __init__(self, desk: Desk, first: str, hit: Hit) -> None:
         self.desk, self.first, self.start, self.end = desk, first, hit.position, hit.position

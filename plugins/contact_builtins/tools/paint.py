@@ -24,6 +24,7 @@ from contact_core.interaction.events import Pointer
 from contact_core.interaction.overlay import NOTHING, WHITE, AxisLine, BrushRing, Overlay, StrokeTint
 from contact_core.interaction.seen import Hit
 from contact_core.interaction.tool import Gesture
+from contact_core.interaction.view import shows
 from contact_core.plugins.registry import BRUSHES
 from contact_core.settings import HasSettings, setting
 
@@ -134,7 +135,7 @@ class Painting(Gesture):
         self.pixels, self.shows = [pointer.pixel], tool.shows
         self.pressure = pointer.pressure
         self._check_locks(patch)
-        self.hides = self._screens() if desk.selection.surface is None else ()
+        self.hides = self._screens() if desk.worked_on is None else ()
         radius = tool.radius_on(desk, hit.surface) / self.seen.scale
         self.field = StrokeField.begun(self.seen.rest, radius)
         self.line = [hit.position]
@@ -154,7 +155,8 @@ class Painting(Gesture):
 
     def _screens(self) -> tuple[Screen, ...]:
         """What stands between the eye and the surface: every other one."""
-        others = (seen for name, seen in self.scene.surfaces.items() if name != self.seen.name)
+        shown = (seen for name, seen in self.scene.surfaces.items() if shows(self.view, name))
+        others = (seen for seen in shown if seen is not self.seen)
         return tuple(Screen(each.mesh, each.surface @ self.seen.world) for each in others if len(each.mesh.faces))
 
     def move(self, pointer: Pointer) -> None:

@@ -61,7 +61,7 @@ class Place(HasSettings):
 
     def _placed(self, desk: Desk) -> SeenSurface | None:
         """The surface that has the gizmo: the one that tools work on."""
-        return None if desk.selection.surface is None else desk.scene.surfaces.get(desk.selection.surface)
+        return None if desk.worked_on is None else desk.scene.surfaces.get(desk.worked_on)
 
 
 class Placing(Drag):

@@ -179,7 +179,7 @@ def test_normals_are_those_of_the_mesh() -> None:
 
 def test_the_camera_moves_as_the_pointer_does(eye: Eye) -> None:
     """A pan keeps the point under the pointer, a zoom as well, and an orbit the one that is looked at."""
-    navigation = Navigation(eye)
+    navigation = Navigation()
     focus = np.zeros(3)
     before = eye.project([focus])[0]
     for event in (
@@ -187,11 +187,11 @@ def test_the_camera_moves_as_the_pointer_does(eye: Eye) -> None:
         Pointer("move", 130, 95),
         Pointer("release", 130, 95, "right"),
     ):
-        navigation.handle(event)
+        navigation.handle(event, eye)
     np.testing.assert_allclose(eye.project([focus])[0, :2], before[:2] + np.array([30, 15]), atol=0.5)
     corner = np.array([0.5, 0.5, 0.0])
     pixel = eye.project([corner])[0, :2]
-    navigation.handle(Pointer("wheel", *pixel, wheel=3.0))
+    navigation.handle(Pointer("wheel", *pixel, wheel=3.0), eye)
     np.testing.assert_allclose(eye.project([corner])[0, :2], pixel, atol=1.0)
     assert eye.project([corner])[0, 2] < before[2]
     eye.fit(icosphere(2).points)
@@ -201,7 +201,7 @@ def test_the_camera_moves_as_the_pointer_does(eye: Eye) -> None:
         Pointer("move", 90, 60),
         Pointer("release", 90, 60, "middle"),
     ):
-        navigation.handle(event)
+        navigation.handle(event, eye)
     np.testing.assert_allclose(eye.project([focus])[0, :2], middle, atol=0.5)
     assert not navigation.is_dragging
 

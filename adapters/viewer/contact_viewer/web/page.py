@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from typing import Any
 
+from contact_viewer.web.library import library
 from contact_viewer.web.timeline import timeline
 
 ICONS = {
@@ -45,7 +46,7 @@ def build(server: Any, stream_name: str) -> None:
 
     with VAppLayout(server, full_height=True, theme=("theme", "dark")) as layout:
         layout.root.theme = ("theme",)
-        client.Style(_text("page.css") + _text("timeline.css"))
+        client.Style(_text("page.css") + _text("timeline.css") + _text("library.css"))
         client.Script(_text("page.js") + _text("timeline.js"))
         _top(v3, html)
         _tools(v3, html)
@@ -58,12 +59,14 @@ def build(server: Any, stream_name: str) -> None:
                     name=stream_name, display="image", send_mouse_move=True, event_throttle_ms=8,
                     style="width: 100%; height: 100%;",
                 )  # fmt: skip
+                html.Div(v_if=("split",), classes="contact-divider")
+                library(v3, html)
                 with html.Div(v_if=("heat",), classes="contact-legend"):
                     with html.Div(v_for="stop in legend", key=("stop.text",)):
                         html.Span(classes="contact-mark", style=("'background: ' + stop.color",))
                         html.Span("{{ stop.text }}")
-                html.Div("{{ next_step }}", v_if=("next_step",), classes="contact-empty")
-                with html.Div(classes="contact-line"):
+                html.Div("{{ next_step }}", v_if=("next_step && !proposed",), classes="contact-empty")
+                with html.Div(classes="contact-line", style=("library_wanted ? 'left: 278px' : ''",)):
                     html.Div("{{ line }}", classes="contact-chip")
                     html.Div("{{ refusal }}", v_if=("refusal",), classes="contact-chip contact-refusal")
             timeline(v3, html, _button)
@@ -85,6 +88,7 @@ def _top(v3: Any, html: Any) -> None:
         _button(v3, "mdi-folder-open-outline", "Open (Ctrl+O)", click="open_wanted = true")
         _button(v3, "mdi-content-save-outline", "Save (Ctrl+S)", click="trigger('act', ['file.save'])")
         _button(v3, "mdi-export-variant", "Export (Ctrl+E)", click="export_wanted = true")
+        _button(v3, "mdi-bookshelf", "Library of grasps (Ctrl+G)", click="library_wanted = !library_wanted")
         v3.VDivider(vertical=True, classes="mx-2")
         for icon, name, action, key in (
             ("mdi-undo-variant", "undo_name", "edit.undo", "Ctrl+Z"),
@@ -143,6 +147,13 @@ def _top(v3: Any, html: Any) -> None:
             ("xray", "mdi-eye-circle-outline", "X-ray", "show.xray", "See through the other surfaces (X)"),
             ("heat", "mdi-thermometer", "Heat", "show.heat", "Colour the skin by distance and depth (Shift+H)"),
             ("isolate", "mdi-crop-free", "Isolate", "show.isolate", "Show only the surface in hand (I)"),
+            (
+                "split",
+                "mdi-view-split-vertical",
+                "Split",
+                "view.split",
+                "The hand left, the object right, each with a camera (Shift+X)",
+            ),
         ):
             v3.VBtn(
                 label, prepend_icon=icon, size="small", classes="text-none mx-1 px-2", title=tip,

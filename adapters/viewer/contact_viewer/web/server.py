@@ -38,6 +38,7 @@ class WebApplication:
         self._told_at = 0.0
         self._pages = 0
         self._help_told = False
+        self._saved_told = 0
         self._pending: set[str] = set()
         self._server = _new_server(self.guard)
         self.stream: Stream | None = None
@@ -79,7 +80,11 @@ class WebApplication:
 
         wslink_server.app.middlewares.append(web.middleware(count))
         wslink_server.app.add_routes(
-            [web.post("/upload", self._upload), web.get("/download/{name}", self._download)]
+            [
+                web.post("/upload", self._upload),
+                web.get("/download/{name}", self._download),
+                web.get("/grasp/{shelf}/{name}", self._picture),
+            ]
         )
 
     def _start(self, **_: Any) -> None:
@@ -102,7 +107,8 @@ class WebApplication:
 
         try:
             path = await self._received(request)
-            self.app.attempt(lambda: self._take(path))
+            self.app.notes.clear()
+            self.app.bring([str(path)])
             answer = web.Response(text=self.app.notes[-1] if self.app.notes else f"{path.name} is open.")
         except ContactError as error:
             answer = web.Response(status=400, text=str(error))
@@ -132,13 +138,6 @@ class WebApplication:
             )
         return path
 
-    def _take(self, path: Path) -> None:
-        """Open what was uploaded: a scene in place of this one, a mesh beside what is there."""
-        if path.suffix.lower() in (".contactscene", ".json"):
-            self.app.open([str(path)])
-        else:
-            self.app.add([path])
-
     async def _download(self, request: Any) -> Any:
         from aiohttp import web
 
@@ -151,6 +150,18 @@ class WebApplication:
         data = path.read_bytes()
         path.unlink()
         return web.Response(body=data, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+    async def _picture(self, request: Any) -> Any:
+        """The thumbnail of a grasp of the library."""
+        from aiohttp import web
+
+        try:
+            data = self.app.shelves.picture(request.match_info["shelf"], request.match_info["name"])
+        except ContactError as error:
+            return web.Response(status=404, text=str(error))
+        if data is None:
+            return web.Response(status=404, text="this grasp has no picture.")
+        return web.Response(body=data, content_type="image/png")
 
     # -- what the page tells -------------------------------------------------------------------------------------
 
@@ -194,11 +205,14 @@ class WebApplication:
         told("choose_pair")(lambda pair: app.choose_pair(str(pair)))
         told("film_end")(lambda last: app.session.timeline.set(last=float(last)))
         told("open")(self._open)
+        told("grasp")(lambda shelf, name: app.shelves.apply(str(shelf), str(name)))
+        told("save_grasp")(lambda name, tags: app.shelves.save(str(name), str(tags or "")))
         told("write")(lambda path: app.write(_path(path)))
         told("uploaded")(lambda text, fine: app.say(str(text)))
         self._server.state.change("theme")(self._theme)
         self._server.state.change("film_open")(self._film_opened)
         self._server.state.change("help_wanted")(self._help_turned)
+        self._server.state.change("library_wanted")(self._library_turned)
 
     def _act(self, action: str) -> None:
         state = self._server.state
@@ -206,6 +220,8 @@ class WebApplication:
             state.open_wanted = True
         elif action == "file.export":
             state.export_wanted = True
+        elif action == "file.library":
+            state.library_wanted = not state.library_wanted
         else:
             self.app.do(action)
 
@@ -220,6 +236,13 @@ class WebApplication:
 
     def _help_turned(self, help_wanted: bool, **_: Any) -> None:
         self.app.help_wanted = self._help_told = bool(help_wanted)
+
+    def _library_turned(self, library_wanted: bool, **_: Any) -> None:
+        if library_wanted:  # read anew each time: others write into it
+            self.app.attempt(self._show_shelves)
+
+    def _show_shelves(self) -> None:
+        self._server.state.shelves = self.app.shelves.rows()
 
     def _film_opened(self, film_open: bool, **_: Any) -> None:
         self.app.film_open = bool(film_open)
@@ -239,6 +262,7 @@ class WebApplication:
         state.trame__title = "contact"
         state.update(
             {"theme": "dark", "open_wanted": False, "export_wanted": False, "help_wanted": False, "open_path": "",
+             "library_wanted": False, "library_word": "", "grasp_name": "", "grasp_tags": "", "shelves": [],
              "film_open": False,
              "export_path": "", "renaming": "", "samples": sorted(self.app.plugins.offers(SAMPLES))}
         )  # fmt: skip
@@ -268,7 +292,11 @@ class WebApplication:
             "suggested": len(app.interaction.proposing.suggestions),
             "undo_name": app.undo_name(),
             "redo_name": app.redo_name(),
+            "split": app.panes.is_split,
         }  # fmt: skip
+        if app.shelves.saved != self._saved_told:
+            self._saved_told = app.shelves.saved
+            self._show_shelves()
         if app.help_wanted != self._help_told:  # else a dialog that is just being closed would open again
             told["help_wanted"] = self._help_told = app.help_wanted
         if app.wants is not None:

@@ -60,9 +60,7 @@ class Stream:
         ratio = min(max(float(size.get("p", 1) or 1), 0.5), 4.0)
         fitting = min(1.0, (_MOST_PIXELS / (width * height * ratio * ratio)) ** 0.5)
         self._scale = ratio * fitting
-        self._app.canvas.resize(round(width * self._scale), round(height * self._scale))
-        self._app.canvas.eye.pixel_ratio = self._scale
-        self._app.drawer.stale = True
+        self._app.resize(round(width * self._scale), round(height * self._scale), self._scale)
         self.wake(redraw=True)
 
     def on_interaction(self, _: object, event: Mapping[str, Any]) -> None:
