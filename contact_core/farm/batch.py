@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 SCHEMA, VERSION = "contact.batch", 1
 RETRIES = 2
+SEARCHED = ("CONTACT_ASSETS", "PXR_AR_DEFAULT_SEARCH_PATH")  # variables that say where assets are sought
 _GRACE_S = 10.0  # after its limit, a job that does not look at its progress is ended with its worker
 _LOOK_S = 0.5  # how often progress is told while nothing ends
 
@@ -117,9 +119,10 @@ def run_batch(
 
 
 def _tasks(jobs: Sequence[FoundJob], out: Path, settings: BatchSettings, plugins: PluginManager) -> list[Task]:
-    options = {"frames": settings.frames, "solver": settings.solver}
-    keys = {kind: key_of(kind, options, plugins) for kind in {job.kind for job in jobs}}
     assets = None if settings.assets is None else str(settings.assets.absolute())
+    roots = [os.environ.get(name) for name in SEARCHED]  # another folder may hold another version of every asset
+    options = {"frames": settings.frames, "solver": settings.solver, "assets": assets, "roots": roots}
+    keys = {kind: key_of(kind, options, plugins) for kind in {job.kind for job in jobs}}
     return [
         Task(
             job.name, job.kind, str(job.path), str(out.absolute() / job.name), keys[job.kind], settings.frames,

@@ -11,6 +11,7 @@ import hashlib
 import os
 import sys
 import threading
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,19 +26,28 @@ _WRITES = os.O_WRONLY | os.O_RDWR
 class Input(TypedDict):
     """A file as a job read it. file: relative to the job's own file, where the drive is the same.
 
-    size, changed (ns): while both are the same the bytes are not read again. sha256: None for what was not there.
+    size, changed, touched (ns): while all are the same the bytes are not read again. changed is what a copy may
+    keep, and a clock that was set back may repeat; touched (POSIX) nobody can set. sha256: None for what was not
+    there, CHANGING for what was written while the job ran, of which nobody knows what the job has read.
     """
 
     file: str
     sha256: str | None
     size: int
     changed: int
+    touched: int
+
+
+Stamp = tuple[int, int, int]
+_FRESH_NS = 2_000_000_000
+CHANGING = "changed while the job ran"
+GONE: Stamp = (-1, -1, -1)  # of a file that is not there
 
 
 class _Notes(threading.local):
     """What the job of this thread has opened; None outside a job."""
 
-    read: set[str] | None = None
+    read: dict[str, Stamp] | None = None
     written: set[str] | None = None
 
 
@@ -47,28 +57,41 @@ _is_installed = False
 
 
 @contextmanager
-def noting_files() -> Iterator[set[str]]:
-    """Yields a set that holds, at the end, the real paths of the plain files that this thread has read inside.
+def noting_files() -> Iterator[dict[str, Stamp]]:
+    """Yields what holds, at the end, the real paths of the plain files that this thread has read inside, each with
+    how it was when it was first opened.
 
     What was written inside, what belongs to Python or to the cache, and what is gone again, is left out.
     """
     _install()
-    read, written, found = set[str](), set[str](), set[str]()
+    read, written, found = dict[str, Stamp](), set[str](), dict[str, Stamp]()
     _notes.read, _notes.written = read, written
     try:
         yield found
     finally:
         _notes.read = _notes.written = None
         own = set(map(os.path.realpath, written))
-        found.update(path for path in set(map(os.path.realpath, read)) - own if _is_input(path))
+        for name, stamp in read.items():
+            path = os.path.realpath(name)
+            if path not in own and _is_input(path):
+                found.setdefault(path, stamp)
 
 
-def as_read(paths: Iterable[str | Path], beside: Path, digests: Digests) -> list[Input]:
-    """The files as they are now, sorted by name. beside: the job's own file."""
+def as_read(
+    paths: Iterable[str | Path], beside: Path, digests: Digests, opened: Mapping[str, Stamp] | None = None
+) -> list[Input]:
+    """The files as they are now, sorted by name. beside: the job's own file. opened: how they were when they were
+    read, where that is known; one that is another now fits nothing, so that its job is done again."""
     found = []
     for path in sorted({os.path.realpath(path) for path in paths}):
-        size, changed = _stamp(path)
-        found.append(Input(file=_relative(path, beside), sha256=digests.of(path), size=size, changed=changed))
+        now = stamp_of(path)
+        held = now == (opened or {}).get(path, now)
+        size, changed, touched = now if held else GONE
+        if touched > time.time_ns() - _FRESH_NS:  # a second change within the same tick leaves the same times
+            touched = 0
+        digest = digests.of(path) if held else CHANGING
+        file = _relative(path, beside)
+        found.append(Input(file=file, sha256=digest, size=size, changed=changed, touched=touched))
     return found
 
 
@@ -76,7 +99,7 @@ def first_change(inputs: Iterable[Mapping[str, Any]], beside: Path, digests: Dig
     """The first file that is not what it was when the job read it; None where all are."""
     for known in inputs:
         path = os.path.normpath(beside.absolute().parent / known["file"])
-        if _stamp(path) == (known["size"], known["changed"]):
+        if stamp_of(path) == (known["size"], known["changed"], known.get("touched")) != GONE:
             continue
         if digests.of(path) != known["sha256"]:
             return path
@@ -87,11 +110,11 @@ class Digests:
     """SHA-256 of files, each read once for as long as it does not change."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[str, int, int], str | None] = {}
+        self._known: dict[tuple[str, Stamp], str | None] = {}
 
     def of(self, path: str) -> str | None:
         """64 hex digits; None for what is no readable file."""
-        key = (path, *_stamp(path))
+        key = (path, stamp_of(path))
         if key not in self._known:
             try:
                 with Path(path).open("rb") as stream:
@@ -101,13 +124,13 @@ class Digests:
         return self._known[key]
 
 
-def _stamp(path: str) -> tuple[int, int]:
-    """Size and time of the last change (ns) of a file; (-1, -1) for one that is not there."""
+def stamp_of(path: str) -> Stamp:
+    """Size, time of the last change and of the last touch (ns) of a file; -1 each for one that is not there."""
     try:
         status = Path(path).stat()
     except (OSError, ValueError):
-        return -1, -1
-    return status.st_size, status.st_mtime_ns
+        return GONE
+    return status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
 def _relative(path: str, beside: Path) -> str:
@@ -135,7 +158,10 @@ def _hear(event: str, arguments: tuple[Any, ...]) -> None:
     if not isinstance(path, str):  # a descriptor
         return
     writes = bool(flags & _WRITES) if isinstance(flags, int) else any(letter in str(mode) for letter in "wax+")
-    (_notes.written if writes else _notes.read).add(path)
+    if writes:
+        _notes.written.add(path)
+    elif path not in _notes.read:
+        _notes.read[path] = stamp_of(path)
 
 
 def _is_input(path: str) -> bool:

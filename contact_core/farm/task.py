@@ -7,7 +7,6 @@ hold now is not. Receipts are JSON in the job's own folder; nothing else remembe
 from __future__ import annotations
 
 import base64
-import contextlib
 import hashlib
 import io
 import json
@@ -15,7 +14,7 @@ import os
 import socket
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -24,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from contact_core._version import __version__
 from contact_core.atomic_file import read_bounded, write_atomic
 from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInput, MissingExtra
-from contact_core.farm.inputs import Digests, as_read, first_change, noting_files
+from contact_core.farm.inputs import GONE, Digests, Stamp, as_read, first_change, noting_files, stamp_of
 from contact_core.plugins.registry import JOB_KINDS
 from contact_core.plugins.slots import JobOutcome, JobRequest
 from contact_core.progress import Progress
@@ -171,7 +170,7 @@ def perform(task: Task) -> Result:
     except Cancelled as error:
         return failed(too_long(task.limit) if task.limit is not None and limit.is_over else str(error))
     except ContactError as error:
-        return failed(str(error), again=isinstance(error.__cause__, OSError))
+        return failed(str(error), again=_is_of_the_disk(error))
     except MemoryError:
         return failed("the memory of the worker did not suffice; try fewer workers on this machine.", again=True)
     except OSError as error:
@@ -194,10 +193,13 @@ def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float, 
             " the same version on all machines."
         )
     path, folder = Path(task.path), Path(task.folder)
-    with contextlib.suppress(FileNotFoundError):
-        (folder / RECEIPT).unlink()
+    try:
+        (folder / RECEIPT).unlink(missing_ok=True)
+    except OSError as error:
+        raise FileRefused(f"cannot write into {folder}: {error.strerror or error}.") from error
     kind = plugins_of_this_process().get(JOB_KINDS, task.kind)
     request = JobRequest(path, folder, task.frames, task.solver, None if task.assets is None else Path(task.assets))
+    opened, now = {os.path.realpath(path): stamp_of(task.path)}, time.time_ns()
     began, cpu = time.perf_counter(), time.process_time()
     with noting_files() as found:
         outcome = kind.run(request, plugins_of_this_process(), progress)
@@ -205,7 +207,13 @@ def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float, 
     inside = os.path.realpath(folder) + os.sep
     paths = {*found, *map(os.path.realpath, outcome.inputs), os.path.realpath(path)}
     paths = {path for path in paths if not path.startswith(inside)}
-    return outcome, list(as_read(paths, path, Digests())), took, cpu
+    return outcome, as_read(paths, path, Digests(), _held(paths, now) | found | opened), took, cpu
+
+
+def _held(paths: Iterable[str], began: int) -> dict[str, Stamp]:
+    """For files that a library opened itself, and that were written since the job began (ns, by this machine's
+    clock): that they were not what they are now."""
+    return {path: GONE for path in paths if max(stamp_of(path)[1:]) > began}
 
 
 @cache
@@ -230,6 +238,13 @@ class _Limit(Progress):
     def tell(self, fraction: float | None, text: str) -> None:
         if self.is_over:
             raise Cancelled("the time is up.")
+
+
+def _is_of_the_disk(error: BaseException | None) -> bool:
+    """Whether a disk or a network is behind an error, so that another attempt may go better."""
+    while error is not None and not isinstance(error, OSError):
+        error = error.__cause__
+    return error is not None
 
 
 def too_long(seconds: float) -> str:

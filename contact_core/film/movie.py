@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contact_core.atomic_file import write_atomic
-from contact_core.errors import InvalidInput
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.film.film import pictures_of, renderer_of
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.rig.rotations import exponential
@@ -52,7 +52,10 @@ def write_movie(
     rate = Fraction(*session.timeline.settings.rate)
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / f"film{Path(path).suffix.lower()}"
-        writer(_drawn(session, pictures, Path(folder), size, progress.part(0.3, 1.0)), made, rate)
+        try:
+            writer(_drawn(session, pictures, Path(folder), size, progress.part(0.3, 1.0)), made, rate)
+        except OSError as error:  # Pillow and PyAV say a full disk as the system does
+            raise FileRefused(f"cannot write a movie into {folder}: {error.strerror or error}.") from error
         write_atomic(Path(path), made.read_bytes())
     return Path(path)
 

@@ -145,7 +145,7 @@ class JobKindContract(Contract):
         """Every file that decides the result is opened by Python, which notes it, or named among the inputs."""
         with noting_files() as noted:
             outcome = run(kind, example, out)
-        known = noted | set(map(os.path.realpath, outcome.inputs))
+        known = set(noted) | set(map(os.path.realpath, outcome.inputs))
         assert all(path.is_absolute() for path in outcome.inputs)
         for path in (example, *reads):
             assert os.path.realpath(path) in known, f"a change of {path.name} would not be seen"

@@ -195,7 +195,16 @@ def _open_ours(path: Path) -> OwnedStage:
 
 def _composed(layer: Sdf.Layer, source: Path) -> Usd.Stage:
     """The stage of our layer, which has no folder of its own: search paths start where they do for the source."""
-    return Usd.Stage.Open(layer, Ar.GetResolver().CreateDefaultContextForAsset(str(source)))
+    return Usd.Stage.Open(layer, _context(source))
+
+
+def _context(source: Path) -> Ar.ResolverContext:
+    """Where the assets of a shot are sought. A studio's own resolver decides it by itself; USD's looks beside the
+    shot, then in CONTACT_ASSETS, then where PXR_AR_DEFAULT_SEARCH_PATH says."""
+    assets = os.environ.get("CONTACT_ASSETS")
+    if assets and type(Ar.GetUnderlyingResolver()) is Ar.DefaultResolver:
+        return Ar.ResolverContext(Ar.DefaultResolverContext([str(source.absolute().parent), assets]))
+    return Ar.GetResolver().CreateDefaultContextForAsset(str(source))
 
 
 def _owned_layer() -> Sdf.Layer:
