@@ -36,7 +36,7 @@ def read_clips(path: Path | str, plugins: PluginManager, *, rate: float | None =
 
 
 def write_clip(session: Session, frames: Sequence[float], path: Path | str) -> Path:
-    """Everything in the scene with its film as one animation (.glb).
+    """Everything in the scene with its film as one animation, in the format of the path (.glb, .usda).
 
     Rigs whose keys are cubic and that stand still keep those keys, as curves with tangents; what else moves is
     written at every one of the frames. Raises FileRefused, InvalidInput.
@@ -45,20 +45,28 @@ def write_clip(session: Session, frames: Sequence[float], path: Path | str) -> P
         raise InvalidInput("a film needs frames, at least one.")
     writer = _format(Path(path), session.plugins)
     film = [session.scene_at(frame) for frame in frames]
-    assets, poses, moving = list[Asset](), dict[str, Pose](), list[PoseKeys]()
-    for name, surface in film[0].surfaces.items():
-        mesh = session.derived.known_meshes.get(surface.digest)
-        if mesh is None:
-            continue
-        rig, units = session.rigs.get(name), surface.meters_per_unit
-        assets.append(Asset(name, mesh, rig, meters_per_unit=units, up_axis=surface.up_axis))
-        poses[name] = _standing(film[0], name, rig)
-        found = _exact(session, film, name, rig) or _baked(frames, film, name, rig)
+    assets, poses = standing_scene(session, film[0])
+    moving = list[PoseKeys]()
+    for asset in assets:
+        found = _exact(session, film, asset.name, asset.rig) or _baked(frames, film, asset.name, asset.rig)
         if found is not None:
             moving.append(found)
     rate = session.timeline.settings.frames_per_second
     writer.write_clip(Path(path), assets, poses, Clip("film", rate, tuple(moving)) if moving else None)
     return Path(path)
+
+
+def standing_scene(session: Session, document: ContactDocument) -> tuple[list[Asset], dict[str, Pose]]:
+    """Everything whose mesh is loaded, and by name how it stands in a document without time: a rig by its roots, an
+    object as one joint, in world space."""
+    assets, poses = list[Asset](), dict[str, Pose]()
+    for name, surface in document.surfaces.items():
+        mesh = session.derived.known_meshes.get(surface.digest)
+        if mesh is not None:
+            rig, units = session.rigs.get(name), surface.meters_per_unit
+            assets.append(Asset(name, mesh, rig, meters_per_unit=units, up_axis=surface.up_axis))
+            poses[name] = _standing(document, name, rig)
+    return assets, poses
 
 
 def _format(path: Path, plugins: PluginManager) -> ClipFormat:

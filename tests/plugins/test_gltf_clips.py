@@ -16,6 +16,7 @@ from contact_builtins.formats.gltf import GltfFiles
 from contact_core.arrays import FloatArray
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.raycast import Locator
+from contact_core.geometry.transform import transform_points
 from contact_core.rig.clip import Clip
 from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose, Rig, forward_kinematics, skin
@@ -158,7 +159,50 @@ def test_what_no_node_can_do_is_refused(rig: Rig, tmp_path: Path) -> None:
     assert not (tmp_path / "film.glb").exists()
 
 
-def test_an_object_without_a_skin_has_no_clips(tmp_path: Path) -> None:
+def flight(name: str, frames: tuple[float, ...], *, turning: bool) -> PoseKeys:
+    """An object that flies, and turns."""
+    places = []
+    for frame in frames:
+        place = np.eye(4)
+        c, s = np.cos(0.1 * frame * turning), np.sin(0.1 * frame * turning)
+        place[:3, :3] = [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+        place[:3, 3] = [0.3 + 0.05 * frame, 0.2, 0.01 * frame]
+        places.append(contact.Pose((name,), place[None]))
+    return PoseKeys(name, frames, tuple(places))
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_an_object_comes_back_moving_as_it_was_written(tmp_path: Path, turning: bool) -> None:
+    keys, ball = flight("ball", (2.0, 5.0, 9.0), turning=turning), contact.Asset("ball", meshes.icosphere(1))
+    path = tmp_path / "flying ball.glb"
+    GltfFiles().write_clip(path, [ball], {"ball": keys.poses[0]}, Clip("film", RATE, (keys,)))
+    read = GltfFiles().read(path)
+    (clip,) = GltfFiles().read_clips(path)
+    assert clip.keys[0].rig == read.name == path.stem
+    assert clip.keys[0].frames == (tuple(map(float, range(2, 10))) if turning else keys.frames)
+    player = Player(path)
+    node = next(k for k, each in enumerate(player.json["nodes"]) if each.get("name") == "ball mesh")
+    for frame, pose in zip(clip.keys[0].frames, clip.keys[0].poses, strict=True):
+        wanted = transform_points(player.nodes_at(frame / RATE)[node], ball.mesh.points)
+        seen = transform_points(pose.local[0], read.mesh.points)
+        assert Locator.of(ball.mesh.with_points(wanted)).closest(seen).distance.max() < 1e-5
+
+
+def test_objects_beside_a_rig_move_by_their_names(rig: Rig, tmp_path: Path) -> None:
+    moving = keys_of(rig, (0.0, 7.0), cubic=True), flight("ball", (0.0, 7.0), turning=False)
+    assets = [
+        contact.Asset(rig.name, rig.surface, rig, meters_per_unit=1.0, up_axis="Y"),
+        contact.Asset("ball", meshes.icosphere(1)),
+        contact.Asset("still", meshes.icosphere(1)),
+    ]
+    path = tmp_path / "film.glb"
+    GltfFiles().write_clip(path, assets, {"ball": moving[1].poses[0]}, Clip("film", RATE, moving))
+    (clip,) = GltfFiles().read_clips(path)
+    assert [keys.rig for keys in clip.keys] == ["film", "ball"]
+    np.testing.assert_allclose(clip.keys[1].poses[1].local[0][:3, 3], [0.35, 0.0, 0.07], atol=1e-6)
+
+
+def test_an_object_that_stands_still_has_no_clips(tmp_path: Path) -> None:
     path = tmp_path / "ball.glb"
     GltfFiles().write(path, [contact.Asset("ball", meshes.icosphere(1))], {})
     assert GltfFiles().read_clips(path) == ()

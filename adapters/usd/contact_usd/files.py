@@ -13,6 +13,7 @@ from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.transform import transform_points
+from contact_core.rig.clip import Clip
 from contact_core.rig.rig import Pose
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ class UsdFiles:
     """Reads any stage; writes text and binary layers. pxr is imported when a file is read or written."""
 
     name = "usd"
-    summary = "meshes and skeletons of USD stages"
+    summary = "meshes, skeletons and animations of USD stages"
     suffixes = (".usda", ".usdc", ".usd", ".usdz")
     can_read = True
     can_write = True
@@ -71,16 +72,44 @@ class UsdFiles:
         except InvalidInput as error:
             raise FileRefused(f"{path} cannot be read: {error}") from error
 
+    def read_clips(self, path: Path, *, sidecar: Path | None = None, rate: float | None = None) -> tuple[Clip, ...]:
+        """What moves in a stage, by the names of its prims. rate: None is the stage's own. Raises FileRefused."""
+        host = _host(path)
+        from contact_usd.clips import read_clip
+
+        try:
+            clip = read_clip(host, Path(path).stem)
+        except InvalidInput as error:
+            raise FileRefused(f"{path} cannot be read: {error}") from error
+        return () if clip is None else (replace(clip, rate=rate or clip.rate),)
+
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
         """A new stage with every asset, rigs in their pose by a SkelAnimation. Raises FileRefused, MissingExtra."""
+        self.write_clip(path, assets, poses, None)
+
+    def write_clip(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose], clip: Clip | None) -> None:
+        """As `write`, with a clip as time samples. Raises FileRefused, InvalidInput, MissingExtra."""
         if not Path(path).absolute().parent.is_dir():
             raise FileRefused(f"{path} cannot be written: there is no folder {Path(path).parent}. Make it first.")
         units = {asset.meters_per_unit for asset in assets if asset.meters_per_unit is not None}
-        host = _host(None, meters_per_unit=min(units, default=1.0), up_axis=assets[0].up_axis if assets else "Y")
+        up_axis = assets[0].up_axis if assets else "Y"
+        host = _host(None, min(units, default=1.0), up_axis, 24.0 if clip is None else clip.rate)
+        from contact_usd import clips
+
+        moving = {} if clip is None else {keys.rig: keys for keys in clip.keys}
+        strangers = sorted(set(moving) - {asset.name for asset in assets})
+        if strangers:
+            raise InvalidInput(f"the clip moves {strangers[0]!r}, but no such asset is written.")
         for asset in assets:
             key = host.add(asset)
-            if asset.rig is not None and asset.name in poses:
-                host.write_pose(key, poses[asset.name])
+            if asset.name in moving:
+                clips.write_keys(host, key, asset, moving[asset.name])
+            elif asset.name in poses and asset.rig is not None:
+                clips.pose_rig(host, key, asset, poses[asset.name])
+            elif asset.name in poses:
+                clips.place(host, key, poses[asset.name].local[0])
+        if clip is not None and clip.keys:
+            clips.tell_range(host.stage, clip)
         host.save(Path(path))
 
 
@@ -89,7 +118,9 @@ def named(paths: Sequence[str]) -> str:
     return ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
 
 
-def _host(path: Path | None, meters_per_unit: float = 1.0, up_axis: str = "Y") -> UsdHost:
+def _host(
+    path: Path | None, meters_per_unit: float = 1.0, up_axis: str = "Y", frames_per_second: float = 24.0
+) -> UsdHost:
     try:
         from contact_usd.host import UsdHost
     except ImportError as error:
@@ -98,7 +129,7 @@ def _host(path: Path | None, meters_per_unit: float = 1.0, up_axis: str = "Y") -
 
     if path is not None:
         return UsdHost(path)
-    return UsdHost(space=SceneSpace(meters_per_unit, up_axis))  # type: ignore[arg-type]
+    return UsdHost(space=SceneSpace(meters_per_unit, up_axis, frames_per_second))  # type: ignore[arg-type]
 
 
 def _one_mesh(host: UsdHost, path: Path, ids: list[str]) -> Asset:

@@ -20,13 +20,14 @@ from contact_core.document.asset import Asset
 from contact_core.document.document import ContactDocument
 from contact_core.document.schema import parse_document
 from contact_core.errors import FileRefused
+from contact_core.film.clip import standing_scene, write_clip
 from contact_core.geometry.transform import transform_points
 from contact_core.opening import DOCUMENT_SUFFIX
 from contact_core.opening import open as open_in_host
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import read_asset
 from contact_core.plugins.registry import FORMATS, HOSTS
-from contact_core.rig.rig import Pose
+from contact_core.plugins.slots import ClipFormat
 from contact_core.scene.host import SceneSpace, StoredDocument
 from contact_core.session import Session
 from contact_viewer.host import ViewerHost
@@ -154,7 +155,8 @@ def _saved_as(session: Session) -> tuple[str, ...]:
 
 
 def export(session: Session, path: Path) -> None:
-    """Write the scene as it is posed and placed, in the format that the path's suffix names (.glb, .usda ...).
+    """Write the scene, in the format that the path's suffix names (.glb, .usda ...): with its film where it has
+    one and the format keeps animations, else as it is posed and placed now.
 
     Raises FileRefused.
     """
@@ -165,32 +167,11 @@ def export(session: Session, path: Path) -> None:
         raise FileRefused(
             f"nothing here writes {path.suffix or 'a name without suffix'}; there are {', '.join(known)}."
         )
-    assets, poses = [], {}
-    for surface in session.document.surfaces.values():
-        mesh = session.derived.known_meshes.get(surface.digest)
-        if mesh is None:
-            continue
-        rig = session.rigs.get(surface.name)
-        assets.append(
-            Asset(surface.name, mesh, rig, meters_per_unit=surface.meters_per_unit, up_axis=surface.up_axis)
-        )
-        poses[surface.name] = _standing(session, surface.name)
-    writers[0].write(path, assets, poses)
-
-
-def _standing(session: Session, name: str) -> Pose:
-    """How a surface stands, in its pose: a rig by its roots, an object as one joint of its own name."""
-    surface, rig = session.document.surface(name), session.rigs.get(name)
-    if rig is None:
-        return Pose((name,), surface.world_from_surface[None])
-    pose = session.document.poses.get(name)
-    local = rig.rest_local.copy()
-    if pose is not None:
-        for joint, matrix in zip(pose.joints, pose.local, strict=True):
-            local[rig.joint_index(joint)] = matrix
-    roots = rig.parents < 0
-    local[roots] = surface.world_from_surface @ local[roots]
-    return Pose(rig.joints, local)
+    film = session.timeline.settings
+    if film.first < film.last and isinstance(writers[0], ClipFormat):
+        write_clip(session, film.frames(), path)
+        return
+    writers[0].write(path, *standing_scene(session, session.document))
 
 
 def _within_folder(source: str) -> str:

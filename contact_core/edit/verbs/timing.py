@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
@@ -14,6 +15,7 @@ from contact_core.document.staleness import motion_source
 from contact_core.document.timeline import (
     CAPTURED,
     Key,
+    PlaceKey,
     PoseKey,
     Span,
     Timeline,
@@ -31,7 +33,7 @@ from contact_core.edit.commands import (
 from contact_core.edit.verbs.keying import Keying, TimedEditor, completed, held, value_of
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.motion.placement_keys import Interpolation, PlacementKey, PlacementKeys
-from contact_core.rig.pose_keys import PoseKeys
+from contact_core.rig.pose_keys import PoseCurves, PoseKeys
 from contact_core.solve.body import Hold
 
 SpanPart = Literal["on", "off", "ease_in", "ease_out", "all"]
@@ -154,14 +156,23 @@ class Film:
         )
 
     def take(self, surface: str, clip: PoseKeys) -> None:
-        """The keys of a clip as pose keys of a surface, in place of what is keyed between its first and its last.
+        """The keys of a clip as keys of a surface, in place of what is keyed between its first and its last: as
+        poses of a rig, and where an object stands.
 
-        They are no pins: solving with the weight `follow` keeps to them and mends their contacts. Joints that the
-        rig does not have are refused, those that the clip does not name rest.
+        Poses are no pins: solving with the weight `follow` keeps to them and mends their contacts. Joints that the
+        rig does not have are refused, those that the clip does not name rest; so is what an object does but move.
         """
-        rig = named(self._editor.rigs, surface, "rig")
-        track = self.track("pose", surface)
-        keys = []
+        if not clip.frames:
+            raise InvalidInput("the clip has no keys.")
+        kind: TrackKind = "pose" if surface in self._editor.rigs else "place"
+        keys = self._poses_of(surface, clip) if kind == "pose" else self._places_of(surface, clip)
+        track = self.track(kind, surface)
+        there = track.frames if track is not None else ()
+        gone = tuple(frame for frame in there if keys[0].frame <= frame <= keys[-1].frame)
+        self._editor.do(SetKeys(address(kind, surface), keys, gone, "Take a clip as"))
+
+    def _poses_of(self, surface: str, clip: PoseKeys) -> tuple[Key, ...]:
+        rig, keys = self._editor.rigs[surface], []
         for row, (frame, pose) in enumerate(zip(clip.frames, clip.poses, strict=True)):
             whole = completed(pose, surface, frame, None, rig)
             speeds = None
@@ -169,11 +180,22 @@ class Film:
                 speeds = np.zeros((len(whole.joints), 6))
                 speeds[[whole.joints.index(joint) for joint in pose.joints]] = clip.speeds[row]
             keys.append(PoseKey(frame, whole, speeds, "smooth" if clip.is_cubic else "linear", CAPTURED))
-        if not keys:
-            raise InvalidInput("the clip has no keys.")
-        there = track.frames if track is not None else ()
-        gone = tuple(frame for frame in there if keys[0].frame <= frame <= keys[-1].frame)
-        self._editor.do(SetKeys(address("pose", surface), tuple(keys), gone, "Take a clip as"))
+        return tuple(keys)
+
+    def _places_of(self, surface: str, clip: PoseKeys) -> tuple[Key, ...]:
+        """Straight keys; a cubic clip gives one at every whole frame, for keys of places hold no speeds."""
+        self.document.surface(surface)
+        if any(len(pose.joints) != 1 for pose in clip.poses):
+            raise InvalidInput(
+                f"{surface!r} has no rig: its clip is one joint, but got {clip.poses[0].joints[:3]}."
+            )
+        frames, local = list(clip.frames), np.array([pose.local for pose in clip.poses])
+        if clip.is_cubic:
+            curves = PoseCurves.joined(clip.frames, local, np.array(clip.speeds))
+            whole = range(math.ceil(frames[0]), math.floor(frames[-1]) + 1)
+            frames = sorted({*frames, *map(float, whole)})
+            local = curves.sampled(frames)
+        return tuple(PlaceKey(at, place, "linear") for at, place in zip(frames, local[:, 0], strict=True))
 
     def remove_key(self, kind: TrackKind, name: str, frame: float | None = None) -> None:
         """Take out the key at a frame, the one shown by default. Without its last key a track ends."""

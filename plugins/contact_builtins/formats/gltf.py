@@ -49,7 +49,7 @@ class GltfFiles:
             return _object_asset(path, parts, notes)
 
     def read_clips(self, path: Path, *, sidecar: Path | None = None, rate: float | None = None) -> tuple[Clip, ...]:
-        """The animations of the rig in a file, none for a file without a skin. Raises FileRefused."""
+        """The animations of the rig in a file, and of its objects. Raises FileRefused."""
         from contact_builtins.formats.gltf_clips import read_clips
 
         path = Path(path)
@@ -61,12 +61,13 @@ class GltfFiles:
             nodes = read_nodes(gltf)
             parts, notes = read_parts(gltf, nodes)
             skins = sorted({part.skin for part in parts if part.skin is not None})
+            objects = list(dict.fromkeys(part.node for part in parts if part.skin is None))
             if not skins:
-                return ()
+                return read_clips(gltf, nodes, None, objects, rate)
             words = read_sidecar(told) if told else None
             rig = rig_asset(gltf, nodes, parts, words, notes).rig
             assert rig is not None
-            return read_clips(gltf, nodes, read_skeleton(gltf, nodes, skins, words), rig, rate)
+            return read_clips(gltf, nodes, (read_skeleton(gltf, nodes, skins, words), rig), objects, rate)
 
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
         """One GLB with every asset; rigs as skins in their pose. Raises FileRefused, InvalidInput."""

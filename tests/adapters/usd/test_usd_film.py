@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("pxr")
 import contact_core as contact
+from contact_core.film.clip import read_clips, write_clip
 from contact_core.proposals.motion import MotionProposal
 from contact_core.rig.rig import forward_kinematics, skin
 from contact_core.testing import meshes
@@ -53,3 +54,36 @@ def test_time_samples_land_on_the_solved_skin(tmp_path: Path) -> None:
     with contact.Session(host=again, discover=False) as reopened:
         assert set(reopened.timed_document.tracks) == set(document.tracks)
         assert reopened.timeline.stale(hand) == ()
+
+
+def test_an_exported_film_lands_on_the_same_skin_and_places(tmp_path: Path) -> None:
+    rig, small = arm_rig(), meshes.icosphere(2)
+    with contact.new(
+        arm=contact.Asset("arm", rig.surface, rig, meters_per_unit=1.0),
+        ball=contact.Asset("ball", small, meters_per_unit=0.01),  # another unit, as a prop of another house
+    ) as session:
+        film = session.timeline
+        film.set(0, 12, rate=25)
+        film.key("pose", "arm", frame=0)
+        film.key("place", "ball", frame=0)
+        film.go(12)
+        local, placed = rig.rest_local.copy(), np.eye(4)
+        local[1, :3, :3] = local[1, :3, :3] @ [[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]
+        session.surfaces.set_pose("arm", contact.Pose(rig.joints, local))
+        placed[:3, 3] = [30.0, 0.0, 5.0]
+        session.surfaces.place("ball", placed)
+        path = write_clip(session, film.settings.frames(), tmp_path / "film.usda")
+        host = UsdHost(path)
+        arm, ball = (next(o.id for o in host.objects() if o.name == name) for name in ("arm", "ball"))
+        assert host.space().frames_per_second == 25.0 and host.stage.GetEndTimeCode() == 12.0
+        for frame in (0.0, 5.0, 12.0):
+            still = session.scene_at(frame)
+            wanted = skin(rig, forward_kinematics(rig.parents, still.poses["arm"].local))
+            np.testing.assert_allclose(host.skin_points(arm, host.read_pose(arm, frame)), 100 * wanted, atol=1e-3)
+            np.testing.assert_allclose(
+                host.placement(ball, frame)[:3, 3], still.surface("ball").world_from_surface[:3, 3], atol=1e-5
+            )
+        (clip,) = read_clips(path, session.plugins)
+        assert {keys.rig for keys in clip.keys} == {"arm", "ball"} and clip.rate == 25.0
+        film.take("ball", next(keys for keys in clip.keys if keys.rig == "ball"))
+        np.testing.assert_allclose(film.at(12.0).surface("ball").world_from_surface, placed, atol=1e-5)

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import contact_core as contact
 from contact_core.errors import InvalidInput
+from contact_core.film.clip import read_clips
 from contact_core.interaction.interaction import Interaction
 
 pytest.importorskip("vtkmodules")
@@ -18,6 +20,7 @@ pytest.importorskip("trame_rca")
 pytest.importorskip("trame_vuetify")
 pytest.importorskip("PIL")
 
+from contact_viewer.files import export
 from contact_viewer.film_panel import drag, film_state
 from tests.adapters.viewer.served import Page, serving
 from tests.adapters.viewer.test_viewer_browser import browser  # noqa: F401 - a fixture
@@ -80,6 +83,20 @@ def test_what_was_dragged_is_one_step(hand: Interaction) -> None:
     assert session.timeline.track("place", BALL).frames == (0.0, 22.0)
     with pytest.raises(InvalidInput, match="dragged"):
         drag(session, "curve", "touch", 0.0, "on", 1.0)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".usda"])
+def test_an_export_is_the_film(tmp_path: Path, suffix: str) -> None:
+    if suffix == ".usda":
+        pytest.importorskip("pxr")
+    with contact.new(**assets()) as session:
+        film(session)
+        export(session, tmp_path / f"film{suffix}")
+        (clip,) = read_clips(tmp_path / f"film{suffix}", session.plugins)
+        moving = next(keys for keys in clip.keys if keys.rig == BALL)
+        assert len(moving.frames) == 25 and clip.rate == 24.0
+        away = session.scene_at(20.0).surface(BALL).world_from_surface[:3, 3]
+        np.testing.assert_allclose(moving.poses[20].local[0, :3, 3], away, atol=1e-5)
 
 
 def test_in_a_browser(browser: Any, tmp_path: Path) -> None:  # noqa: F811 - the fixture

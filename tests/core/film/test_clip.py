@@ -16,6 +16,7 @@ from contact_core.film.clip import read_clips, write_clip
 from contact_core.geometry.transform import transform_points
 from contact_core.motion.problem import MotionWeights
 from contact_core.proposals.motion import MotionProposal, MotionSettings
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import forward_kinematics, skin
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
@@ -82,6 +83,28 @@ def test_a_clip_is_taken_and_mended(session: contact.Session, tmp_path: Path) ->
         other.undo()
         other.undo()
         assert other.timeline.track("pose", ARM) is None
+
+
+def test_an_object_takes_the_places_of_a_clip(session: contact.Session) -> None:
+    track = session.timeline.track("place", BALL)
+    keys = PoseKeys("any", (0.0, 8.0), tuple(contact.Pose(("any",), place(x)[None]) for x in (0.0, 0.4)))
+    session.timeline.take(BALL, keys)
+    assert session.timeline.track("place", BALL).frames == (0.0, 8.0, 20.0)  # what lies beyond stays
+    np.testing.assert_allclose(session.timeline.at(6.0).surface(BALL).world_from_surface, place(0.3), atol=1e-12)
+    session.undo()
+    assert session.timeline.track("place", BALL) is track
+    speeds = (np.array([[0.1, 0, 0, 0, 0, 0]]), np.zeros((1, 6)))
+    session.timeline.take(BALL, PoseKeys("any", keys.frames, keys.poses, speeds))
+    assert session.timeline.track("place", BALL).frames == (*map(float, range(9)), 20.0)
+    two = PoseKeys("any", (0.0,), (contact.Pose(("a", "b"), np.stack([np.eye(4)] * 2)),))
+    with pytest.raises(InvalidInput, match="one joint"):
+        session.timeline.take(BALL, two)
+
+
+def place(x: float) -> np.ndarray:
+    result = np.eye(4)
+    result[0, 3] = x
+    return result
 
 
 def test_what_cannot_be_a_clip_is_refused(session: contact.Session, tmp_path: Path) -> None:
