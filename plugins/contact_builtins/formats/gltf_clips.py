@@ -31,9 +31,9 @@ def read_clips(
 ) -> tuple[Clip, ...]:
     """The animations of a file that move its rig or its objects, the nodes of meshes without a skin.
 
-    Keys of an object place what `read` gives: the identity is where it stands in the file. Where there is no rig and
-    all move as one, they are one, under the file's name. rate: frames per second; None: what the file says, else 24. Raises
-    InvalidInput for times that do not rise and values that do not fit.
+    Keys of an object place what `read` gives: the identity is where it stands in the file. Where there is no rig
+    and all move as one, they are one, under the file's name. rate: frames per second; None: what the file says,
+    else 24. Raises InvalidInput for times that do not rise and values that do not fit.
     """
     entries = gltf.entries("animations")
     bounded(len(entries), "animations", MAX_CLIPS)
