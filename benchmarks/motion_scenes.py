@@ -9,6 +9,7 @@ import numpy as np
 from pose_grips import Grip
 from pose_scenes import chair
 
+from contact_builtins.terms.balance import BalanceTerm
 from contact_core.arrays import FloatArray
 from contact_core.document.timeline import Span
 from contact_core.geometry.raycast import Locator
@@ -161,10 +162,11 @@ def growing(frames: int = 73) -> MotionProblem:
     return MotionProblem(tuple(map(float, range(frames))), tuple(problems), RATE)
 
 
-def sitting(seconds: float = 5.0, heels: float = 0.3) -> MotionProblem:
+def sitting(seconds: float = 5.0, heels: float = 0.3, balance: float = 1.0) -> MotionProblem:
     """The body stands, sits down with its hands on its thighs, and stands up again; its feet are held throughout.
 
-    The soles stand where they are at rest; the chair comes under the body.
+    The soles stand where they are at rest; the chair comes under the body. Its centre of mass stays above what
+    bears: it leans forward on the way, and comes upright where the seat has taken over.
     """
     scene = chair().problem
     body = scene.bodies[0]
@@ -175,7 +177,8 @@ def sitting(seconds: float = 5.0, heels: float = 0.3) -> MotionProblem:
     scene = replace(scene, bodies=(body, *scene.bodies[1:]))
     feet = tuple(_in_place(contact, scene) for contact in scene.contacts if contact.name.startswith("foot"))
     others = tuple(contact for contact in scene.contacts if not contact.name.startswith("foot"))
-    base = replace(scene, contacts=(*feet, *others), length=scene.manipulator_length)
+    terms = (*scene.terms, BalanceTerm(weight=balance))
+    base = replace(scene, contacts=(*feet, *others), terms=terms, length=scene.manipulator_length)
     frames = np.arange(round(seconds * RATE) + 1)
     problems = []
     for share in frames / frames[-1]:

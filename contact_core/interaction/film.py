@@ -25,6 +25,7 @@ from contact_core.scene.problem import world_from_surface
 if TYPE_CHECKING:
     from contact_core.interaction.desk import Desk
     from contact_core.proposals.film import FilmMeasures
+    from contact_core.session import Session
 
 KeyKind: TypeAlias = Literal["authored", "solved", "stale", "clip", "value"]
 NEAR, FAR = 0.001, 0.003  # metres between points that are to touch: good up to, bad from
@@ -32,6 +33,7 @@ SKATE = 0.0024  # metres per second: a tenth of a millimetre a frame at 24
 TURNING = 60.0  # radians per second squared: what a joint of a person seldom exceeds
 DEPTH = 0.01  # of the manipulator: what skin may be deep
 MOST_MEASURED = 2_000  # frames; of longer films every so many-th is measured
+LEVELS = ((0.208, 0.702, 0.490), (0.878, 0.631, 0.0), (0.898, 0.325, 0.294))  # colours: good, fair, bad
 BEFORE, AFTER = (0.95, 0.45, 0.35), (0.35, 0.75, 0.55)  # colours of what was and of what comes
 
 
@@ -112,57 +114,19 @@ class FilmDesk:
 
     def view(self) -> FilmView:
         """Of the document now; curves as they were measured last."""
-        film = self.desk.session.timeline
-        settings, document = film.settings, film.document
-        return FilmView(
-            settings.first,
-            settings.last,
-            settings.frames_per_second,
-            film.frame,
-            tuple(bar for pair in document.pairs for bar in self._bars(document, pair)),
-            self._marks(document),
-            () if self._measures is None else curves_of(self._measures),
-            self._measured is document,
-        )
+        session, measures = self.desk.session, self._measures
+        curves = () if measures is None else curves_of(measures)
+        return film_view(session, bars_of(session, measures), self._marks(), curves, self._is_measured())
 
-    def _bars(self, document: ContactDocument, pair: str) -> list[Bar]:
-        ends = document.pairs[pair]
-        color = document.patch(ends.manipulator).color
-        spans = self.desk.session.timeline.spans(pair)
-        settings = self.desk.session.timeline.settings
-        given = [(k, s.on, s.off, s.ease_in, s.ease_out) for k, s in enumerate(spans)]
-        given = given or [(-1, settings.first, settings.last, 0.0, 0.0)]
-        return [Bar(pair, *values, color, self._levels(pair, values[1], values[2])) for values in given]
+    def _is_measured(self) -> bool:
+        return self._measured is self.desk.session.timeline.document
 
-    def _levels(self, pair: str, on: float, off: float) -> tuple[tuple[float, float, int], ...]:
-        """Stretches of equal level of a pair within a span."""
-        if self._measures is None or pair not in self._measures.series.errors:
-            return ()
-        series, unit = self._measures.series, self._measures.meters_per_unit
-        pieces: list[tuple[float, float, int]] = []
-        for frame, error in zip(series.frames, unit * series.errors[pair], strict=True):
-            if not on <= frame <= off or np.isnan(error):
-                continue
-            level = int(error > NEAR) + int(error > FAR)
-            if pieces and pieces[-1][2] == level:
-                pieces[-1] = pieces[-1][0], frame, level
-            else:
-                pieces.append((pieces[-1][1] if pieces else frame, frame, level))
-        return tuple(pieces)
-
-    def _marks(self, document: ContactDocument) -> tuple[KeyMark, ...]:
+    def _marks(self) -> tuple[KeyMark, ...]:
         """Of all tracks; kept for as long as the document is the same."""
+        document = self.desk.session.timeline.document
         if self._kept is None or self._kept[0] is not document:
-            found = (mark for where, track in document.tracks.items() for mark in self._of_track(where, track))
-            self._kept = document, tuple(found)
+            self._kept = document, marks_of(self.desk.session)
         return self._kept[1]
-
-    def _of_track(self, where: str, track: Track) -> list[KeyMark]:
-        kind, name = of_address(where)
-        if kind != "pose":
-            return [KeyMark(where, key.frame, "value") for key in track.keys]
-        stale = set(self.desk.session.timeline.stale(name))
-        return [KeyMark(where, key.frame, _kind(key, stale)) for key in track.of(PoseKey)]
 
     # --- measuring ----------------------------------------------------------------------------------------------
 
@@ -182,7 +146,7 @@ class FilmDesk:
             return False
         frames = settings.frames()
         frames = frames[:: 1 + len(frames) // MOST_MEASURED]
-        draft_at = self._drafts(frames)
+        draft_at = drafts_of(session, frames)
 
         def work(progress: Progress) -> tuple[ContactDocument, FilmMeasures]:
             from contact_core.proposals.film import measure_film
@@ -202,13 +166,6 @@ class FilmDesk:
 
     def _take(self, found: tuple[ContactDocument, FilmMeasures]) -> None:
         self._measured, self._measures = found
-
-    def _drafts(self, frames: Sequence[float]) -> Callable[[float], Draft]:
-        """Drafts for a thread: the scene is read here and not there."""
-        session = self.desk.session
-        stills = {frame: session.scene_at(frame) for frame in frames}
-        derived, rigs = session.derived.apart(), dict(session.rigs)
-        return lambda frame: Draft(stills[frame], derived, rigs)
 
     # --- playing ------------------------------------------------------------------------------------------------
 
@@ -266,6 +223,77 @@ class FilmDesk:
         if name in still.poses:
             points = skin(rig, forward_kinematics(rig.parents, pose_on(rig, still.poses[name])))
         return transform_points(world_from_surface(still, name, self.desk.scene.meters_per_unit), points)
+
+
+def film_view(
+    session: Session,
+    bars: tuple[Bar, ...],
+    keys: tuple[KeyMark, ...],
+    curves: tuple[Curve, ...] = (),
+    measured: bool = False,
+) -> FilmView:
+    """The film of a session with what is found of it."""
+    film = session.timeline
+    settings = film.settings
+    return FilmView(
+        settings.first, settings.last, settings.frames_per_second, film.frame, bars, keys, curves, measured
+    )
+
+
+def bars_of(session: Session, measures: FilmMeasures | None = None) -> tuple[Bar, ...]:
+    """A bar for each span of each pair, one for a pair without spans; tinted as the film was measured."""
+    film = session.timeline
+    document, settings, bars = film.document, film.settings, list[Bar]()
+    for name, pair in document.pairs.items():
+        color = document.patch(pair.manipulator).color
+        given = [(k, s.on, s.off, s.ease_in, s.ease_out) for k, s in enumerate(film.spans(name))]
+        given = given or [(-1, settings.first, settings.last, 0.0, 0.0)]
+        bars += [Bar(name, *values, color, _levels(measures, name, values[1], values[2])) for values in given]
+    return tuple(bars)
+
+
+def marks_of(session: Session) -> tuple[KeyMark, ...]:
+    """The keys of all tracks."""
+    return tuple(
+        mark
+        for where, track in session.timeline.document.tracks.items()
+        for mark in _of_track(session, where, track)
+    )
+
+
+def drafts_of(session: Session, frames: Sequence[float]) -> Callable[[float], Draft]:
+    """Drafts at frames for a thread: the scene is read here and not there."""
+    stills = {frame: session.scene_at(frame) for frame in frames}
+    derived, rigs = session.derived.apart(), dict(session.rigs)
+    return lambda frame: Draft(stills[frame], derived, rigs)
+
+
+def _levels(
+    measures: FilmMeasures | None, pair: str, on: float, off: float
+) -> tuple[tuple[float, float, int], ...]:
+    """Stretches of equal level of a pair within a span."""
+    if measures is None or pair not in measures.series.errors:
+        return ()
+    pieces: list[tuple[float, float, int]] = []
+    for frame, error in zip(
+        measures.series.frames, measures.meters_per_unit * measures.series.errors[pair], strict=True
+    ):
+        if not on <= frame <= off or np.isnan(error):
+            continue
+        level = int(error > NEAR) + int(error > FAR)
+        if pieces and pieces[-1][2] == level:
+            pieces[-1] = pieces[-1][0], frame, level
+        else:
+            pieces.append((pieces[-1][1] if pieces else frame, frame, level))
+    return tuple(pieces)
+
+
+def _of_track(session: Session, where: str, track: Track) -> list[KeyMark]:
+    kind, name = of_address(where)
+    if kind != "pose":
+        return [KeyMark(where, key.frame, "value") for key in track.keys]
+    stale = set(session.timeline.stale(name))
+    return [KeyMark(where, key.frame, _kind(key, stale)) for key in track.of(PoseKey)]
 
 
 def curves_of(measures: FilmMeasures) -> tuple[Curve, ...]:

@@ -72,6 +72,7 @@ def contact_pose_terms() -> list[object]:
         "contact_builtins.terms.self_collision:SelfCollisionTerm",
         "contact_builtins.terms.aims:PinTerm",
         "contact_builtins.terms.aims:LookTerm",
+        "contact_builtins.terms.balance:BalanceTerm",
     ]
 
 

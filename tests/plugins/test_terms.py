@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from contact_builtins.terms.aims import Look, LookTerm, Pin, PinTerm
+from contact_builtins.terms.balance import BalanceTerm, away_from, convex_hull
 from contact_builtins.terms.self_collision import SelfCollisionTerm
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
@@ -67,6 +68,24 @@ class TestSelfCollision(TermContract):
         crossed = pulled_together()
         pose = LevenbergMarquardt().solve(crossed).poses["hand-like"]
         return scene(rigs.hand_like(), pose=pose)
+
+
+def on_still_ground(gain: float = 1.0) -> PoseProblem:
+    """The scene of the contract, with a ball that stands still and bears."""
+    problem = scene()
+    still = replace(problem.bodies[1], movable=False)
+    held, *others = problem.contacts
+    return replace(problem, bodies=(problem.bodies[0], still), contacts=(replace(held, gain=gain), *others))
+
+
+class TestBalance(TermContract):
+    @pytest.fixture
+    def term(self) -> PoseTerm:
+        return BalanceTerm()
+
+    @pytest.fixture
+    def problem(self) -> PoseProblem:
+        return on_still_ground()
 
 
 class TestPin(TermContract):
@@ -189,6 +208,27 @@ def test_terms_that_lack_something_say_so(term: PoseTerm) -> None:
     with pytest.raises(InvalidInput) as refusal:
         still.value(still.start_state)
     assert len(str(refusal.value).split()) >= 6
+
+
+@given(arrays(np.float64, (9, 2), elements=st.integers(-4, 4).map(float)), st.tuples(*[st.floats(-9, 9)] * 2))
+def test_what_is_off_a_support_is_the_way_to_its_nearest_point(points: FloatArray, at: tuple[float, float]) -> None:
+    hull, place = convex_hull(points), np.array(at)
+    off, derivative = away_from(hull, place)
+    for corner in hull:  # the nearest point of a convex set: no corner lies beyond it
+        assert (corner - (place - off)) @ off <= 1e-9 * (1.0 + off @ off)
+    back, _ = away_from(hull, place - off)
+    assert np.abs(back).max() < 1e-9 and np.abs(derivative - derivative.T).max() < 1e-12
+    assert {tuple(corner) for corner in hull} <= {tuple(point) for point in points}
+
+
+def test_a_support_that_fades_in_changes_the_balance_smoothly() -> None:
+    problem = replace(on_still_ground(), terms=(BalanceTerm(),))
+    values = []
+    for gain in np.linspace(0.0, 1.0, 41):
+        now = replace(on_still_ground(float(gain)), terms=problem.terms)
+        values.append(now.value(now.start_state))
+    assert values[0] == 0.0  # nothing bears
+    assert np.abs(np.diff(values[1:])).max() < 0.1 * max(values)
 
 
 def test_thinned_vertices_share_the_whole_area() -> None:

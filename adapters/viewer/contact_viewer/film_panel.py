@@ -9,11 +9,12 @@ import numpy as np
 from contact_core.arrays import FloatArray
 from contact_core.document.timeline import of_address
 from contact_core.errors import InvalidInput
+from contact_core.interaction.film import LEVELS as COLORS
 from contact_core.interaction.film import Bar, Curve, FilmView
 from contact_core.session import Session
 from contact_viewer.look import hexed
 
-LEVELS = ("#35b37e", "#e0a100", "#e5534b")  # good, fair, bad: as in the panel of residuals
+LEVELS = tuple(hexed(color) for color in COLORS)  # good, fair, bad: as in the panel of residuals
 HEADROOM = 1.15  # of a curve, over what is larger: its top or its limit
 
 

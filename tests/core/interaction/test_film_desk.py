@@ -16,6 +16,7 @@ from contact_core.document.schema import dump_document
 from contact_core.document.timeline import Span, Timeline
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.interaction.film import FilmDesk
+from contact_core.interaction.film_shapes import HEIGHT, shapes_of
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.playback import Playback
 from contact_core.motion.report import motion_report
@@ -82,6 +83,22 @@ def test_curves_are_the_figures_of_the_film(hand: Interaction) -> None:
     session.timeline.hold("touch", 8, 16)
     assert not hand.film.view().measured  # the document moved on
     assert hand.film.measure() and hand.film.measure() is not None
+
+
+def test_shapes_have_a_lane_for_each_pair_and_track(hand: Interaction) -> None:
+    shapes = shapes_of(hand.film.view())
+    assert shapes.lanes[-1] == "touch" and set(shapes.lanes[:-1]) == {
+        f"place of {BALL}",
+        "placement of " + hand.session.document.pairs["touch"].object,
+    }
+    lane = len(shapes.lanes) - 1
+    assert (np.floor(shapes.triangles[..., 1]) == lane).all()
+    across = shapes.triangles[..., 0]
+    assert (across.min(), across.max()) == (2.0, 24.0)  # with its ramps
+    one, two = (shapes.triangles[:, k] - shapes.triangles[:, 0] for k in (1, 2))
+    areas = 0.5 * np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+    assert areas.sum() == pytest.approx(2 * HEIGHT * (12 + 0.5 * (6 + 4)))
+    assert sorted(shapes.keys[:, 0]) == [0.0, 8.0, 20.0, 20.0] and not any(shapes.hollow)
 
 
 def test_series_agree_with_the_report(hand: Interaction) -> None:

@@ -10,8 +10,19 @@ from typing import Any
 
 import bpy
 
-from contact_blender.extension import modal, operators, panel, preferences, shared, toolbar, warming
+from contact_blender.extension import (
+    film,
+    modal,
+    operators,
+    panel,
+    preferences,
+    shared,
+    span_operators,
+    toolbar,
+    warming,
+)
 
+_DECLARING = operators, span_operators  # whose operators `declaring` has made
 _registered: list[Any] = []
 
 
@@ -26,6 +37,7 @@ def register(package: str = __name__) -> None:
         _registered.append(kind)
     bpy.types.WindowManager.contact = bpy.props.PointerProperty(type=panel.ContactSettings)
     toolbar.register()
+    film.register()
 
 
 def unregister() -> None:
@@ -33,6 +45,7 @@ def unregister() -> None:
     panel.stop_waiting()
     shared.close_all()
     if _registered:
+        film.unregister()
         toolbar.unregister()
     if hasattr(bpy.types.WindowManager, "contact"):
         del bpy.types.WindowManager.contact

@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from contact_blender.extension import shared
+from contact_blender.extension import film, shared
 
 # The modes in which a step of Blender's undo holds the whole scene (`undo.WHOLE_SCENE`).
 MODES = frozenset(("OBJECT", "POSE", "SCULPT", "PAINT_WEIGHT", "PAINT_VERTEX"))
@@ -106,6 +106,7 @@ def _run(self: Any, context: Any, action: Action, by_blender: bool = False) -> s
 
     try:
         session = shared.session()
+        film.follow_frame(session)
         with session.host.step_of_operator() if by_blender else contextlib.nullcontext():
             said = action(session, context, self)
     except ContactError as error:

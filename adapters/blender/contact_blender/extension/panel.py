@@ -279,12 +279,38 @@ class CONTACT_PT_pose(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spe
         column.operator("contact.clear_pose", icon="LOOP_BACK")
 
 
+class CONTACT_PT_time(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spelling)
+    """When the active pair holds; its bars are in the timeline."""
+
+    bl_label = "Over Time"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        found = shared.held()
+        return found is not None and bool(found.session.document.pairs)
+
+    def draw(self, context: Any) -> None:
+        column = self.layout.column(align=True)
+        column.operator("contact.span_add", icon="ADD")
+        row = column.row(align=True)
+        row.operator("contact.span_trim", text="Start Here", icon="TRACKING_FORWARDS_SINGLE").end = "on"
+        row.operator("contact.span_trim", text="End Here", icon="TRACKING_BACKWARDS_SINGLE").end = "off"
+        row = column.row(align=True)
+        row.operator("contact.span_move", text="Earlier", icon="TRIA_LEFT").frames = -1.0
+        row.operator("contact.span_move", text="Later", icon="TRIA_RIGHT").frames = 1.0
+        row = column.row(align=True)
+        row.operator("contact.span_ease", icon="IPO_EASE_IN_OUT")
+        row.operator("contact.span_remove", icon="REMOVE")
+        self.layout.operator("contact.film_measure", icon="DRIVER_DISTANCE")
+
+
 PANELS = (
     CONTACT_UL_patches,
     CONTACT_UL_pairs,
     CONTACT_PT_contacts,
     CONTACT_PT_shape,
     CONTACT_PT_pairs,
+    CONTACT_PT_time,
     CONTACT_PT_pose,
 )
 

@@ -17,6 +17,8 @@ import bpy
 if TYPE_CHECKING:
     from contact_blender.extension.artist import Artist
     from contact_core.document.document import ContactDocument
+    from contact_core.interaction.film_shapes import FilmShapes
+    from contact_core.proposals.film import FilmMeasures
     from contact_core.proposals.proposal import Proposal
     from contact_core.session import Session
 
@@ -28,12 +30,16 @@ LIBRARIES = ("numpy", "scipy", "numba", "pluggy", "threadpoolctl", "rich")
 @dataclass
 class Held:
     """What is kept of a scene. residuals: 95 % of a pair's points are nearer than this (scene units), by pair, as
-    the solve of `solved` (a revision) left them. artist: the interaction with its views, once a tool was used."""
+    the solve of `solved` (a revision) left them. artist: the interaction with its views, once a tool was used.
+    measured: the document whose film was measured last, and the figures. shapes: what the timelines show, and of
+    what (`film.shapes`)."""
 
     session: Session
     residuals: dict[str, float] = field(default_factory=dict)
     solved: int = -1
     artist: Artist | None = None
+    measured: tuple[ContactDocument, FilmMeasures] | None = None
+    shapes: tuple[object, FilmShapes] | None = None
 
 
 _held: dict[int, Held] = {}

@@ -1,0 +1,153 @@
+"""Contacts over time in Blender's Timeline and Dope Sheet: bars of pairs and marks of keys above the frames.
+
+What is drawn are the core's shapes (`contact_core.interaction.film_shapes`), the same bars and colours as in the
+application's timeline; they are made anew only when the document or what was measured has changed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from contact_blender.extension import shared
+
+if TYPE_CHECKING:
+    from contact_core.interaction.film_shapes import FilmShapes
+    from contact_core.session import Session
+
+_LANE, _KEY, _ABOVE = 18.0, 4.5, 22.0  # pixels of a plain screen: a lane, half a key, and the scrollbar below
+_WORDS = 11.0
+_handlers: list[Any] = []
+
+
+def register() -> None:
+    """Draw in every timeline from now on."""
+    _handlers.append(bpy.types.SpaceDopeSheetEditor.draw_handler_add(draw, (), "WINDOW", "POST_PIXEL"))
+
+
+def unregister() -> None:
+    """Draw no more."""
+    while _handlers:
+        bpy.types.SpaceDopeSheetEditor.draw_handler_remove(_handlers.pop(), "WINDOW")
+
+
+def redraw() -> None:
+    """Ask for a drawing of every timeline."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas if window.screen else ():
+            if area.type == "DOPESHEET_EDITOR":
+                area.tag_redraw()
+
+
+def follow_frame(session: Session) -> None:
+    """The frame that the scene shows is the frame at which edits are keys. No edit itself."""
+    frame = float(bpy.context.scene.frame_current_final)
+    if session.timeline.frame != frame:
+        session.timeline.go(frame)
+
+
+def give_range(session: Session) -> None:
+    """A film without a range takes that of the scene, with its rate. Part of a macro."""
+    from fractions import Fraction
+
+    film, scene = session.timeline, bpy.context.scene
+    if film.settings.first == film.settings.last:
+        base = Fraction(scene.render.fps_base).limit_denominator(1001)
+        film.set(scene.frame_start, scene.frame_end, scene.render.fps / base)
+
+
+def measure(session: Session) -> str:
+    """Measure the contacts at every frame, for the tints of the bars. Raises InvalidInput, Cancelled."""
+    from contact_core.interaction.film import drafts_of
+    from contact_core.proposals.film import measure_film
+
+    document, frames = session.timeline.document, session.timeline.settings.frames()
+    found = shared.held()
+    assert found is not None  # the session that runs this
+    drafts = drafts_of(session, frames)
+    found.measured = document, measure_film(document, frames, drafts, depth=False, progress=session.host)
+    redraw()
+    series, unit = found.measured[1].series, found.measured[1].meters_per_unit
+    worst = np.nanmax(series.error) if np.isfinite(series.error).any() else 0.0
+    return f"Measured {len(frames)} frames: contacts within {1e3 * unit * worst:.2f} mm."
+
+
+def shapes() -> FilmShapes | None:
+    """What is to be drawn of the open scene, None where it has no film. Begins nothing."""
+    found = shared.held()
+    if found is None or not found.session.timeline.document.is_timed:
+        return None
+    asked = found.session.timeline.document, found.measured
+    if found.shapes is None or found.shapes[0] != asked:
+        from contact_core.interaction.film import bars_of, film_view, marks_of
+        from contact_core.interaction.film_shapes import shapes_of
+
+        measures = None if found.measured is None else found.measured[1]
+        view = film_view(found.session, bars_of(found.session, measures), marks_of(found.session))
+        found.shapes = asked, shapes_of(view)
+    return found.shapes[1]
+
+
+def draw() -> None:
+    """Called by Blender for each timeline."""
+    context = bpy.context
+    overlays = getattr(context.space_data, "overlays", None)
+    made = shapes() if getattr(overlays, "show_overlays", True) else None
+    if made is None or not made.lanes:
+        return
+    scale = float(context.preferences.system.ui_scale)
+    gpu.state.blend_set("ALPHA")
+    try:
+        _draw_lanes(made, context.region, scale)
+        triangles = _pixels(made.triangles.reshape(-1, 2), context.region, scale)
+        _fill(triangles, np.repeat(made.colors, 3, axis=0))
+        _draw_keys(made, _pixels(made.keys, context.region, scale), scale)
+    finally:
+        gpu.state.blend_set("NONE")
+
+
+def _pixels(places: Any, region: Any, scale: float) -> Any:
+    """(n, 2) of (frame, lane)."""
+    start, step = (region.view2d.view_to_region(frame, 0.0, clip=False)[0] for frame in (0.0, 1000.0))
+    across = start + places[:, 0] * (step - start) / 1000.0
+    return np.stack([across, (_ABOVE + places[:, 1] * _LANE) * scale], axis=1)
+
+
+def _draw_lanes(made: Any, region: Any, scale: float) -> None:
+    """A dark ground, so that bars are read over the rows of channels, and the name of each lane."""
+    top = (_ABOVE + len(made.lanes) * _LANE) * scale
+    low, wide = 0.85 * _ABOVE * scale, float(region.width)
+    ground = [(0, low), (wide, low), (wide, top), (0, low), (wide, top), (0, top)]
+    _fill(np.array(ground), np.tile((0.08, 0.08, 0.08, 0.72), (6, 1)))
+    blf.size(0, _WORDS * scale)
+    blf.color(0, 0.9, 0.9, 0.9, 0.9)
+    for place, name in enumerate(made.lanes):
+        blf.position(0, 8.0 * scale, (_ABOVE + (place + 0.3) * _LANE) * scale, 0.0)
+        blf.draw(0, name)
+
+
+def _draw_keys(made: Any, middles: Any, scale: float) -> None:
+    diamond = np.array([(-1, 0), (0, -1), (1, 0), (-1, 0), (1, 0), (0, 1)]) * _KEY * scale
+    for size, chosen, colors in (
+        (1.35, np.ones(len(middles), bool), np.tile((0.05, 0.05, 0.05, 1.0), (len(middles), 1))),
+        (1.0, np.ones(len(middles), bool), made.key_colors),
+        (0.5, np.array(made.hollow, bool), np.tile((0.08, 0.08, 0.08, 1.0), (len(middles), 1))),
+    ):
+        corners = (middles[chosen, None, :] + size * diamond).reshape(-1, 2)
+        _fill(corners, np.repeat(colors[chosen], 6, axis=0))
+
+
+def _fill(corners: Any, colors: Any) -> None:
+    """Triangles of pixels (n, 2) in colours (n, 4)."""
+    if len(corners):
+        shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+        content = {"pos": np.ascontiguousarray(np.c_[corners, np.zeros(len(corners))], np.float32),
+                   "color": np.ascontiguousarray(colors, np.float32)}  # fmt: skip
+        batch = batch_for_shader(shader, "TRIS", content)
+        shader.bind()
+        batch.draw(shader)
