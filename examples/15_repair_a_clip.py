@@ -9,8 +9,9 @@ import contact_core as contact
 from contact_core.cli import main
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import read_asset
+from contact_core.rig.rotations import exponential
 
-# A scene to work on: a body that stands on the floor and wanders over it by two centimetres, feet and all.
+# A scene to work on: a body that swings its arms, and wanders over the floor by three centimetres, feet and all.
 body = read_asset("sample:human_body", PluginManager())
 rig = body.rig
 assert rig is not None
@@ -27,7 +28,13 @@ actor = host.add(body)
 host.add(contact.Asset("floor", floor, meters_per_unit=body.meters_per_unit, up_axis=body.up_axis))
 for frame in range(25):
     local = rig.rest_local.copy()
-    local[0, along, 3] += 0.02 * np.sin(0.5 * frame)
+    local[0, along, 3] += 0.03 * np.sin(0.25 * frame)
+    local[0, across, 3] += 0.02 * np.sin(0.4 * frame)
+    for joint, way in (("upperarm_l", 1.0), ("upperarm_r", -1.0)):
+        index = rig.joint_index(joint)
+        shoulder = rig.rest_world[rig.parents[index], :3, :3]
+        turn = exponential(0.5 * way * np.sin(0.25 * frame) * np.eye(3)[[along]])[0][0]
+        local[index, :3, :3] = shoulder.T @ turn @ shoulder @ local[index, :3, :3]
     host.write_pose(actor, contact.Pose(rig.joints, local), float(frame))
 with contact.Session(host=host, objects=None) as session:
     session.timeline.set(0, 24, rate=24)

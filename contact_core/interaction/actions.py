@@ -59,6 +59,8 @@ ACTIONS: tuple[Action, ...] = (
     Action("pose.rest", "Rest pose", ("Shift+R",), "pose", "put the hands back to rest"),
     Action("film.play", "Play", ("Shift+Right",), "film", "play the film from here, or stop it"),
     Action("film.first", "First frame", ("Shift+Left",), "film", "go to the first frame of the film"),
+    Action("film.solve", "Solve the film", ("Ctrl+Shift+Space",), "film", "propose the poses of all frames"),
+    Action("film.window", "Solve round here", ("Shift+T",), "film", "propose two seconds round the frame anew"),
     Action("film.onion", "Onion skin", ("O",), "film", "ghosts of the pose before and after the frame"),
     Action("show.xray", "See through", ("X",), "show", "see through the surface that tools do not work on"),
     Action("show.isolate", "Isolate", ("I",), "show", "show only the surface that tools work on"),

@@ -96,12 +96,14 @@ class FilmView:
 class FilmDesk:
     """The film that an interaction works on: what a timeline shows of it, playing it, and ghosts beside the frame.
 
-    onion: how many ghosts are shown before and after the frame, `onion_step` frames apart.
+    onion: how many ghosts are shown before and after the frame, `onion_step` frames apart. follows: whether what
+    was dragged begins a solve of what is stale round it; for front ends that advance the interaction all the time.
     """
 
     desk: Desk
     onion: int = 0
     onion_step: float = 4.0
+    follows: bool = False
     playback: Playback = field(default_factory=Playback)
     worker: Worker = field(default_factory=Worker)
     _measures: FilmMeasures | None = None

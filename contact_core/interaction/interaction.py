@@ -19,6 +19,7 @@ from contact_core.interaction.drawing import DocumentDrawing
 from contact_core.interaction.editing import EDITS
 from contact_core.interaction.events import Event, Key, Pointer
 from contact_core.interaction.film import FilmDesk
+from contact_core.interaction.film_solving import stale_window
 from contact_core.interaction.heat import HeatMap
 from contact_core.interaction.holding import Holding
 from contact_core.interaction.live import LiveSolve, prepare
@@ -228,6 +229,7 @@ class Interaction(Holding):
             raise
         self._over()
         self.desk.commit()
+        self.follow_film(self.session.timeline.frame)
         if self.desk.selection is not selection:
             self._touch("selection", "visibility")
 
@@ -288,6 +290,8 @@ class Interaction(Holding):
             "pose.live": lambda: self.set(live=not settings.live),
             "film.play": lambda: self.film.play(time.monotonic()),
             "film.first": lambda: self._show_frame(self.session.timeline.settings.first),
+            "film.solve": self.proposing.solve_film,
+            "film.window": lambda: self.proposing.solve_film(self.session.timeline.window()),
             "film.onion": lambda: self.show_onion(0 if self.film.onion else 3),
             "show.xray": lambda: self.set(xray=not settings.xray),
             "show.isolate": lambda: self.set(isolate=not settings.isolate),
@@ -302,6 +306,15 @@ class Interaction(Holding):
     def _show_frame(self, frame: float) -> None:
         self.film.playback.stop()
         self.session.timeline.go(frame)
+
+    def follow_film(self, frame: float) -> None:
+        """After something was dragged at a frame: propose the two seconds round it anew where solved keys are stale
+        now, and the hand follows what is dragged (the setting `live`, and `FilmDesk.follows`)."""
+        film = self.session.timeline
+        if self.film.follows and self.settings.live and film.document.is_timed and self.session.document.pairs:
+            window = stale_window(self.session, frame)
+            if window:
+                self.proposing.solve_film(window)
 
     def show_onion(self, count: int, step: float | None = None) -> None:
         """So many ghosts of the film before and after the frame, so many frames apart. Raises InvalidInput."""

@@ -149,18 +149,36 @@ class Proposing:
         if not session.document.pairs:
             raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
         self.dismiss()
-        terms = paper_terms(prior=settings.prior_weight) + body_terms(self._desk)
-        poses = dict(session.document.poses)
-        objective = Objective(terms) if settings.prior == "rest" else Objective(terms, prior=poses)
+        objective, solver = self._objective(), settings.solver
         start, derived, rigs = session.document, session.derived.apart(), dict(session.rigs)
         read = session.binding.read(start)  # as the scene has it; the host is asked here and not on the thread
-        solver = settings.solver
 
         def work(progress: Progress) -> Proposal:
             draft = Draft(read, derived, rigs)
             return find(start, draft, SolveSettings(solver, objective=objective, progress=progress))
 
         self._worker.begin(title, work, self.show)
+
+    def solve_film(self, frames: Sequence[float] | None = None) -> None:
+        """Begin to solve the film, or some of its frames, as a whole. Raises CommandRejected without a range."""
+        from contact_core.interaction.film_solving import film_work
+
+        session, film = self._desk.session, self._desk.session.timeline
+        if film.settings.first == film.settings.last:
+            raise CommandRejected("the film has one frame: say its last frame first.")
+        if not session.document.pairs:
+            raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
+        self.dismiss()
+        chosen = film.settings.frames() if frames is None else tuple(frames)
+        work = film_work(session, chosen, self._objective(), self._desk.settings.solver)
+        self._worker.begin("Solve the film", work, self.show)
+
+    def _objective(self) -> Objective:
+        settings = self._desk.settings
+        terms = paper_terms(prior=settings.prior_weight) + body_terms(self._desk)
+        if settings.prior == "rest":
+            return Objective(terms)
+        return Objective(terms, prior=dict(self._desk.session.document.poses))
 
     def show(self, proposal: Proposal) -> None:
         """Show a proposal in place of the document, until it is accepted or dismissed.

@@ -7,10 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from contact_builtins.terms.aims import Look, LookTerm, Pin, PinTerm
 from contact_builtins.terms.balance import BalanceTerm, away_from, convex_hull
 from contact_builtins.terms.self_collision import SelfCollisionTerm
+from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
@@ -73,7 +77,8 @@ class TestSelfCollision(TermContract):
 def on_still_ground(gain: float = 1.0) -> PoseProblem:
     """The scene of the contract, with a ball that stands still and bears."""
     problem = scene()
-    still = replace(problem.bodies[1], movable=False)
+    ball = problem.bodies[1]
+    still = Body.rigid("ball", ball.rig.surface, world_from_surface=ball.world_from_rig)
     held, *others = problem.contacts
     return replace(problem, bodies=(problem.bodies[0], still), contacts=(replace(held, gain=gain), *others))
 

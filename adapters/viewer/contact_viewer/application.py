@@ -21,6 +21,7 @@ from contact_viewer import files, panel
 from contact_viewer.canvas import Canvas
 from contact_viewer.drawer import Drawer
 from contact_viewer.file_actions import FileActions
+from contact_viewer.film_panel import drag
 from contact_viewer.guide import Guide
 from contact_viewer.host import ViewerHost
 from contact_viewer.look import THEMES
@@ -118,6 +119,7 @@ class Application(TreeActions, FileActions):
             session.host.canvas = self.canvas
         self._session = session
         self._interaction = Interaction(session, meters_per_unit=meters)
+        self._interaction.film.follows = True
         self._recovery.follow(session)
         self.panes.join()
         self.drawer = Drawer(self._interaction, self.panes, self.guide.overlay)
@@ -309,6 +311,12 @@ class Application(TreeActions, FileActions):
         self.interaction.film.playback.stop()
         self.session.timeline.go(frame)
         self._filmed = True
+
+    def drag_film(self, what: str, name: str, frame: float, part: Any, to: float) -> None:
+        """What was dragged in the timeline: one step, and what is stale round it is solved anew. Raises
+        ContactError."""
+        drag(self.session, what, name, frame, part, to)
+        self.interaction.follow_film(to)
 
     def play_loop(self, loop: bool) -> None:
         """Whether the film begins again at its end."""

@@ -38,7 +38,7 @@ class BalanceTerm(HasSettings):
     summary: ClassVar[str] = "the centre of mass stays above what bears"
     up: Vector = (0.0, 1.0, 0.0)
     weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
-    inside: float = setting(0.5, low=0.0, high=1.0, help="share of the support that is free to stand over")
+    inside: float = setting(0.8, low=0.0, high=1.0, help="share of the support that is free to stand over")
     name: str = "balance"
 
     def bind(self, problem: PoseProblem) -> BoundTerm:

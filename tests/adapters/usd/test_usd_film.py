@@ -8,13 +8,59 @@ import numpy as np
 import pytest
 
 pytest.importorskip("pxr")
+from pxr import Gf, UsdGeom
+
 import contact_core as contact
 from contact_core.film.clip import read_clips, write_clip
 from contact_core.proposals.motion import MotionProposal
 from contact_core.rig.rig import forward_kinematics, skin
 from contact_core.testing import meshes
-from contact_core.testing.host_scenes import arm_rig
+from contact_core.testing.host_scenes import arm_rig, bent
 from contact_usd.host import UsdHost
+
+
+def paired(session: contact.Session) -> tuple[str, str]:
+    """Pairs the tip of the arm with the ball."""
+    hand, thing = list(session.document.surfaces)[:2]
+    mesh, ball = session.geometry.mesh(hand), session.geometry.mesh(thing)
+    tip = int(np.argmax(mesh.points[:, 1] + mesh.points[:, 0]))
+    near = np.argsort(np.linalg.norm(mesh.points - mesh.points[tip], axis=1))[:6]
+    points = contact.SurfacePoints.at_vertices(mesh, near)
+    session.patches.paint("tip", points, surface=hand, axis=points[:1], heading=1.0)
+    side = contact.SurfacePoints.at_vertices(ball, [int(np.argmin(ball.points[:, 0]))])
+    session.pairs.add("tip", session.patches.transfer("tip", thing, side, heading=1.0), name="touch")
+    return hand, thing
+
+
+def test_samples_outside_the_range_other_rigs_and_places_stay(tmp_path: Path) -> None:
+    rig, small = arm_rig(), meshes.icosphere(2)
+    host = UsdHost()
+    arm = host.add(contact.Asset("arm", rig.surface, rig, meters_per_unit=1.0))
+    ball = host.add(contact.Asset("ball", contact.TriangleMesh(0.2 * small.points + [0.6, 0.5, 0.1], small.faces)))
+    other = host.add(contact.Asset("other", rig.surface, rig, meters_per_unit=1.0))
+    flying = UsdGeom.Xformable(host.stage.GetPrimAtPath(ball)).MakeMatrixXform()
+    for frame in range(1, 31):
+        host.write_pose(arm, bent(rig, frame), float(frame))
+        host.write_pose(other, bent(rig, frame + 100), float(frame))
+        place = np.eye(4)
+        place[0, 3] = 0.01 * frame
+        flying.Set(Gf.Matrix4d(place.T.tolist()), float(frame))
+    host.save(tmp_path / "shot.usda")
+    before = UsdHost(tmp_path / "shot.usda")
+    host = UsdHost(tmp_path / "shot.usda")
+    with contact.Session(host=host, objects=None, discover=False) as session:
+        paired(session)
+        session.timeline.set(1, 30, 24)
+        session.accept(session.solve(frames=[float(frame) for frame in range(12, 19)]))
+        session.save(tmp_path / "keyed.usda")
+    after = UsdHost(tmp_path / "keyed.usda")
+    assert after.pose_keys(arm) == before.pose_keys(arm)
+    moved = []
+    for frame in map(float, range(1, 31)):
+        moved.append(np.abs(after.read_pose(arm, frame).local - before.read_pose(arm, frame).local).max())
+        np.testing.assert_array_equal(after.read_pose(other, frame).local, before.read_pose(other, frame).local)
+        np.testing.assert_array_equal(after.placement(ball, frame), before.placement(ball, frame))
+    assert max(moved[:11] + moved[18:]) < 1e-6 < 1e-3 < min(moved[11:18])
 
 
 def test_time_samples_land_on_the_solved_skin(tmp_path: Path) -> None:
@@ -24,14 +70,7 @@ def test_time_samples_land_on_the_solved_skin(tmp_path: Path) -> None:
     ball = contact.TriangleMesh(0.2 * small.points + [0.6, 0.5, 0.1], small.faces)
     host.add(contact.Asset("ball", ball, meters_per_unit=1.0))
     with contact.Session(host=host, objects=None, discover=False) as session:
-        hand, thing = session.document.surfaces
-        mesh, ball = session.geometry.mesh(hand), session.geometry.mesh(thing)
-        tip = int(np.argmax(mesh.points[:, 1] + mesh.points[:, 0]))
-        near = np.argsort(np.linalg.norm(mesh.points - mesh.points[tip], axis=1))[:6]
-        points = contact.SurfacePoints.at_vertices(mesh, near)
-        session.patches.paint("tip", points, surface=hand, axis=points[:1], heading=1.0)
-        side = contact.SurfacePoints.at_vertices(ball, [int(np.argmin(ball.points[:, 0]))])
-        session.pairs.add("tip", session.patches.transfer("tip", thing, side, heading=1.0), name="touch")
+        hand, thing = paired(session)
         session.timeline.set(1, 13, 24)
         session.timeline.key("place", thing, frame=1)
         session.timeline.go(13)

@@ -85,6 +85,50 @@ def test_curves_are_the_figures_of_the_film(hand: Interaction) -> None:
     assert hand.film.measure() and hand.film.measure() is not None
 
 
+def proposed(hand: Interaction) -> MotionProposal:
+    assert hand.worker.wait(600.0)
+    hand.advance()
+    found = hand.proposing.proposal
+    assert isinstance(found, MotionProposal), hand.status
+    return found
+
+
+def test_the_film_is_solved_beside_the_window_and_a_drag_solves_what_is_round_it(hand: Interaction) -> None:
+    session = hand.session
+    steps = len(session.history.steps)
+    hand.do("film.solve")
+    assert proposed(hand).motion is not None and len(session.history.steps) == steps  # a ghost so far
+    hand.do("edit.accept")
+    assert len(session.history.steps) == steps + 1 and session.timeline.stale(ARM) == ()
+    session.timeline.set(last=80)
+    hand.do("film.solve")
+    proposed(hand)
+    hand.do("edit.accept")
+    session.timeline.move_span("touch", 14.0, "off", 18.0)  # a drag in the timeline
+    stale = session.timeline.stale(ARM)
+    hand.follow_film(18.0)
+    assert stale and hand.worker.status is None  # a front end that does not advance by itself is left alone
+    hand.film.follows = True
+    hand.follow_film(18.0)
+    frames = proposed(hand).motion.motion.frames
+    assert frames[0] == 0.0 and 42.0 <= frames[-1] <= 44.0  # a second on either side, and what is pinned
+    hand.do("edit.accept")
+    assert not [frame for frame in session.timeline.stale(ARM) if frame <= 40.0]
+    hand.set(live=False)
+    session.timeline.move_span("touch", 14.0, "off", 20.0)
+    hand.follow_film(20.0)
+    assert hand.worker.status is None
+
+
+def test_a_film_without_a_range_or_a_pair_is_refused_in_words(hand: Interaction) -> None:
+    hand.session.pairs.remove("touch")
+    with pytest.raises(CommandRejected, match="no pair yet"):
+        hand.do("film.solve")
+    hand.session.timeline.set(0, 0)
+    with pytest.raises(CommandRejected, match="one frame"):
+        hand.do("film.window")
+
+
 def test_shapes_have_a_lane_for_each_pair_and_track(hand: Interaction) -> None:
     shapes = shapes_of(hand.film.view())
     assert shapes.lanes[-1] == "touch" and set(shapes.lanes[:-1]) == {

@@ -34,7 +34,14 @@ ICONS = {
     "axis": "ops.gpencil.draw.line", "weigh": "ops.gpencil.radius", "joint": "ops.pose.push",
     "measure": "ops.view3d.ruler",
 }  # fmt: skip
-OF_ITS_OWN = ("pose.solve", "pose.settle", "pose.slide", "pose.suggest")  # what runs beside the window
+OF_ITS_OWN = (
+    "pose.solve",
+    "pose.settle",
+    "pose.slide",
+    "pose.suggest",
+    "film.solve",
+    "film.window",
+)  # run beside the window
 PIE = (
     "tool.paint",
     "tool.transfer",

@@ -15,7 +15,7 @@ from contact_core.interaction.actions import GROUPS
 from contact_core.plugins.registry import FORMATS, SAMPLES
 from contact_viewer import panel
 from contact_viewer.application import Application
-from contact_viewer.film_panel import drag, film_state
+from contact_viewer.film_panel import film_state
 from contact_viewer.look import THEMES
 from contact_viewer.web.browser_events import key_of
 from contact_viewer.web.guard import HOST, Guard
@@ -196,9 +196,7 @@ class WebApplication:
         told("card")(lambda which: app.turn_card(str(which)))
         told("go_to")(lambda frame: app.go_to(float(frame)))
         told("film_drag")(
-            lambda what, name, frame, part, to: drag(
-                app.session, what, str(name), float(frame), str(part), float(to)
-            )
+            lambda what, name, frame, part, to: app.drag_film(what, str(name), float(frame), str(part), float(to))
         )
         told("film_loop")(lambda loop: app.play_loop(bool(loop)))
         told("show_worst")(app.show_worst)

@@ -111,6 +111,7 @@ def _strip(v3: Any, html: Any, button: Any) -> None:
         with v3.VBtn(icon=True, size="small", density="comfortable", click="trigger('act', ['film.onion'])",
                      title="Onion skin (O)", color=("film.onion ? 'primary' : undefined",)):  # fmt: skip
             v3.VIcon("mdi-layers-triple-outline", size="20")
+        button(v3, "mdi-auto-fix", "Solve the film (Ctrl+Shift+Space)", click="trigger('act', ['film.solve'])")
         button(v3, "mdi-key-plus", "Key the pose (A)", click="trigger('act', ['pose.key'])")
         with html.Div(classes="track"):
             with html.Div(v_for="lane in film.lanes", key=("lane.track",)):
