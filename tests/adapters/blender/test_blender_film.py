@@ -102,6 +102,9 @@ def test_the_timeline_draws_what_the_core_makes(bpy: Any, shared: Any) -> None:
     bpy.ops.contact.solve(keyed=True, first=1, last=24)
     assert bpy.ops.contact.film_measure() == {"FINISHED"}
     made = film.shapes()
-    assert made.lanes[-1] == "touch" and "pose of arm" in made.lanes and len(made.keys) >= 2
+    assert {"touch", "pose of arm"} <= set(made.lanes) and len(made.keys) >= 2
+    assert made.lanes[-1].startswith("contact error") and len(made.segments) > 24
+    assert bpy.ops.contact.film_worst(curve="contact error") == {"FINISHED"}
+    assert 8 <= bpy.context.scene.frame_current <= 14 and f"at {bpy.context.scene.frame_current}" in made.lanes[-1]
     held = {tuple(color[:3]) for color in made.colors if color[3] > 0.9}
     assert held and held <= set(LEVELS)  # tinted by the error that was measured

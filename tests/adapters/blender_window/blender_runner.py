@@ -27,7 +27,7 @@ import pytest
 HERE = Path(__file__).parent
 REPOSITORY = HERE.parents[2]
 OLDEST = (4, 2)
-PATIENCE = 2400  # seconds for one act
+PATIENCE = 24000  # seconds for one act
 SIZE = (1280, 800)
 
 _spec = importlib.util.spec_from_file_location(

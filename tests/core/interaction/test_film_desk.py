@@ -81,6 +81,11 @@ def test_curves_are_the_figures_of_the_film(hand: Interaction) -> None:
     assert np.isfinite(acceleration.values[1:-1]).all() and np.isfinite(depth.values).all()
     assert skate.unit == "mm/s" and view.bars[0].levels[0][0] == 8.0 and view.bars[0].levels[-1][1] == 20.0
     session.timeline.hold("touch", 8, 16)
+    shapes = shapes_of(view)  # of what was measured
+    assert [lane.partition(":")[0] for lane in shapes.lanes[-4:]] == [c.name for c in view.curves[::-1]]
+    curves = shapes.segments[shapes.segments[..., 1].min(axis=1) > len(shapes.lanes) - 1]  # the uppermost lane
+    assert len(curves) == 1 + 12 and curves[1:, :, 0].min() == 8.0  # its limit, and where it holds
+    assert (np.floor(curves[..., 1]) == len(shapes.lanes) - 1).all()
     assert not hand.film.view().measured  # the document moved on
     assert hand.film.measure() and hand.film.measure() is not None
 

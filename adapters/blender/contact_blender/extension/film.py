@@ -62,7 +62,7 @@ def give_range(session: Session) -> None:
 
 
 def measure(session: Session) -> str:
-    """Measure the contacts at every frame, for the tints of the bars. Raises InvalidInput, Cancelled."""
+    """Measure every frame, for the tints of bars and the curves. Raises InvalidInput, Cancelled."""
     from contact_core.interaction.film import drafts_of
     from contact_core.proposals.film import measure_film
 
@@ -70,11 +70,26 @@ def measure(session: Session) -> str:
     found = shared.held()
     assert found is not None  # the session that runs this
     drafts = drafts_of(session, frames)
-    found.measured = document, measure_film(document, frames, drafts, depth=False, progress=session.host)
+    found.measured = document, measure_film(document, frames, drafts, progress=session.host)
     redraw()
     series, unit = found.measured[1].series, found.measured[1].meters_per_unit
     worst = np.nanmax(series.error) if np.isfinite(series.error).any() else 0.0
     return f"Measured {len(frames)} frames: contacts within {1e3 * unit * worst:.2f} mm."
+
+
+def show_worst(session: Session, curve: str) -> str:
+    """Go to the frame at which a curve is worst. Raises InvalidInput where it was not measured."""
+    from contact_core.errors import InvalidInput
+    from contact_core.interaction.film import curves_of
+
+    found = shared.held()
+    known = () if found is None or found.measured is None else curves_of(found.measured[1])
+    worst = next((each for each in known if each.name == curve and each.worst is not None), None)
+    if worst is None or worst.worst is None:
+        raise InvalidInput(f"nothing is known of {curve} yet: measure the contacts over time first.")
+    whole = int(np.floor(worst.worst))
+    bpy.context.scene.frame_set(whole, subframe=worst.worst - whole)
+    return f"{curve} is worst at frame {worst.worst:g}{f', of {worst.pair}' if worst.pair else ''}."
 
 
 def shapes() -> FilmShapes | None:
@@ -84,11 +99,12 @@ def shapes() -> FilmShapes | None:
         return None
     asked = found.session.timeline.document, found.measured
     if found.shapes is None or found.shapes[0] != asked:
-        from contact_core.interaction.film import bars_of, film_view, marks_of
+        from contact_core.interaction.film import bars_of, curves_of, film_view, marks_of
         from contact_core.interaction.film_shapes import shapes_of
 
-        measures = None if found.measured is None else found.measured[1]
-        view = film_view(found.session, bars_of(found.session, measures), marks_of(found.session))
+        session, measures = found.session, None if found.measured is None else found.measured[1]
+        curves = () if measures is None else curves_of(measures)
+        view = film_view(session, bars_of(session, measures), marks_of(session), curves)
         found.shapes = asked, shapes_of(view)
     return found.shapes[1]
 
@@ -106,6 +122,7 @@ def draw() -> None:
         _draw_lanes(made, context.region, scale)
         triangles = _pixels(made.triangles.reshape(-1, 2), context.region, scale)
         _fill(triangles, np.repeat(made.colors, 3, axis=0))
+        _draw_lines(_pixels(made.segments.reshape(-1, 2), context.region, scale), made.segment_colors, scale)
         _draw_keys(made, _pixels(made.keys, context.region, scale), scale)
     finally:
         gpu.state.blend_set("NONE")
@@ -129,6 +146,16 @@ def _draw_lanes(made: Any, region: Any, scale: float) -> None:
     for place, name in enumerate(made.lanes):
         blf.position(0, 8.0 * scale, (_ABOVE + (place + 0.3) * _LANE) * scale, 0.0)
         blf.draw(0, name)
+
+
+def _draw_lines(ends: Any, colors: Any, scale: float) -> None:
+    """Segments between pixels (2 m, 2), as slim rectangles."""
+    first, second = ends[0::2], ends[1::2]
+    along = second - first
+    side = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    side *= 0.75 * scale / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    corners = [first - side, second - side, second + side, first - side, second + side, first + side]
+    _fill(np.stack(corners, axis=1).reshape(-1, 2), np.repeat(colors, 6, axis=0))
 
 
 def _draw_keys(made: Any, middles: Any, scale: float) -> None:

@@ -301,7 +301,9 @@ class CONTACT_PT_time(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spe
         row = column.row(align=True)
         row.operator("contact.span_ease", icon="IPO_EASE_IN_OUT")
         row.operator("contact.span_remove", icon="REMOVE")
-        self.layout.operator("contact.film_measure", icon="DRIVER_DISTANCE")
+        column = self.layout.column(align=True)
+        column.operator("contact.film_measure", icon="DRIVER_DISTANCE")
+        column.operator_menu_enum("contact.film_worst", "curve")
 
 
 PANELS = (

@@ -19,6 +19,15 @@ HOLDS = (
     ("point", "Point", "The place alone: it may turn"),
     ("direction", "Direction", "The way it faces, at any distance"),
 )
+CURVES = tuple(
+    (name, name.capitalize(), said)
+    for name, said in (
+        ("contact error", "How far apart a pair is while it holds"),
+        ("skate", "How fast a pair slips while it holds"),
+        ("acceleration", "Of any joint"),
+        ("penetration", "How deep skin is"),
+    )
+)
 EASE = -1.0  # the default ramp of the core
 
 
@@ -112,6 +121,17 @@ def film_measure(session: Any, context: Any, given: Any) -> str:
     with session.macro("Measure the film"):
         film.give_range(session)
     return film.measure(session)
+
+
+@operator(
+    "film_worst",
+    "Go to the Worst Frame",
+    "pair",
+    curve=EnumProperty(items=CURVES, name="Curve", description="What is worst there", default="contact error"),
+)
+def film_worst(session: Any, context: Any, given: Any) -> str:
+    """Go to the frame at which what was measured is worst."""
+    return film.show_worst(session, given.curve)
 
 
 def _pair_of(session: Any, context: Any, name: str) -> str:
