@@ -6,6 +6,7 @@ application's timeline; they are made anew only when the document or what was me
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import blf
@@ -119,11 +120,12 @@ def draw() -> None:
     scale = float(context.preferences.system.ui_scale)
     gpu.state.blend_set("ALPHA")
     try:
-        _draw_lanes(made, context.region, scale)
+        _draw_ground(len(made.lanes), context.region, scale)
         triangles = _pixels(made.triangles.reshape(-1, 2), context.region, scale)
         _fill(triangles, np.repeat(made.colors, 3, axis=0))
         _draw_lines(_pixels(made.segments.reshape(-1, 2), context.region, scale), made.segment_colors, scale)
         _draw_keys(made, _pixels(made.keys, context.region, scale), scale)
+        _write_names(made.lanes, scale)
     finally:
         gpu.state.blend_set("NONE")
 
@@ -135,17 +137,23 @@ def _pixels(places: Any, region: Any, scale: float) -> Any:
     return np.stack([across, (_ABOVE + places[:, 1] * _LANE) * scale], axis=1)
 
 
-def _draw_lanes(made: Any, region: Any, scale: float) -> None:
-    """A dark ground, so that bars are read over the rows of channels, and the name of each lane."""
-    top = (_ABOVE + len(made.lanes) * _LANE) * scale
-    low, wide = 0.85 * _ABOVE * scale, float(region.width)
+def _draw_ground(lanes: int, region: Any, scale: float) -> None:
+    """Dark, so that bars are read over the rows of channels."""
+    low, top, wide = 0.85 * _ABOVE * scale, (_ABOVE + lanes * _LANE) * scale, float(region.width)
     ground = [(0, low), (wide, low), (wide, top), (0, low), (wide, top), (0, top)]
     _fill(np.array(ground), np.tile((0.08, 0.08, 0.08, 0.72), (6, 1)))
+
+
+def _write_names(names: Sequence[str], scale: float) -> None:
+    """Over all else, with a shadow, at the left of each lane."""
     blf.size(0, _WORDS * scale)
-    blf.color(0, 0.9, 0.9, 0.9, 0.9)
-    for place, name in enumerate(made.lanes):
+    blf.color(0, 1.0, 1.0, 1.0, 0.95)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 5, 0.0, 0.0, 0.0, 1.0)
+    for place, name in enumerate(names):
         blf.position(0, 8.0 * scale, (_ABOVE + (place + 0.3) * _LANE) * scale, 0.0)
         blf.draw(0, name)
+    blf.disable(0, blf.SHADOW)
 
 
 def _draw_lines(ends: Any, colors: Any, scale: float) -> None:
