@@ -8,7 +8,7 @@ from typing import Any
 from contact_core.contact.axis_generator import AxisGenerator
 from contact_core.contact.brush import Brush
 from contact_core.document.document import ContactDocument, Proxy
-from contact_core.edit.command import Command, apply_command
+from contact_core.edit.command import Command, Macro, apply_command
 from contact_core.edit.derived import Derived
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.edit.editor import Editor, Makers
@@ -35,7 +35,8 @@ class Stroke:
         self._start = editor.document if seen is None else seen
         self._derived = editor.derived
         self._preview = preview
-        self._command: Command | None = None
+        self._edit: Command | None = None
+        self._following: tuple[Command, ...] = ()
         self._shown = self._start
         self._open = True
         self.geometry = DocumentGeometry(lambda: self._start, self._derived, self.rigs)
@@ -62,31 +63,54 @@ class Stroke:
         return self._derived
 
     @property
+    def edit(self) -> Command | None:
+        """What the last verb previews, without what follows it."""
+        return self._edit
+
+    @property
     def command(self) -> Command | None:
         """What would be committed now."""
-        return self._command
+        return _joined(self._edit, self._following)
 
     def do(self, command: Command, *, origin: str = "user") -> None:
         """Preview a command in place of the one before. Raises CommandRejected; then the old preview stays."""
-        if not self._open:
-            raise CommandRejected("this stroke is over.")
-        self._shown = apply_command(command, self._start)
-        self._command = command
-        self._preview(self._shown)
+        self._show(command, self._following)
+
+    def follow(self, commands: tuple[Command, ...]) -> None:
+        """Preview these after the edit, and after each that takes its place, and commit them with it: the pose that
+        follows what is dragged. Raises CommandRejected; then the old preview stays."""
+        self._show(self._edit, commands)
 
     def cancel(self) -> None:
         """Back to the start; nothing will be committed unless another verb comes."""
-        self._command, self._shown = None, self._start
+        self._edit, self._following, self._shown = None, (), self._start
         self._preview(self._start)
 
     def abandon(self) -> None:
         """End it with nothing to commit, nor to show."""
-        self._command, self._shown, self._open = None, self._start, False
+        self._edit, self._following, self._shown, self._open = None, (), self._start, False
 
     def end(self) -> Command | None:
         """Close the stroke; returns what is to be committed."""
         self._open = False
-        return self._command
+        return self.command
+
+    def _show(self, edit: Command | None, following: tuple[Command, ...]) -> None:
+        if not self._open:
+            raise CommandRejected("this stroke is over.")
+        whole = _joined(edit, following)
+        self._shown = self._start if whole is None else apply_command(whole, self._start)
+        self._edit, self._following = edit, following
+        self._preview(self._shown)
+
+
+def _joined(edit: Command | None, following: tuple[Command, ...]) -> Command | None:
+    """An edit and what follows it as one step, under the name of the edit."""
+    if not following:
+        return edit
+    if edit is None:
+        return Macro(", ".join(each.label() for each in following), following)
+    return Macro(edit.label(), (edit, *following))
 
 
 class KeptBrushes(Makers):

@@ -177,6 +177,11 @@ class Desk:
         """What the stroke would commit now."""
         return None if self._stroke is None else self._stroke.command
 
+    @property
+    def edit(self) -> Command | None:
+        """What the gesture previews now, without the pose that follows it."""
+        return None if self._stroke is None else self._stroke.edit
+
     def preview_nothing(self) -> None:
         """Show the document of the press again: a drag that came back is nothing."""
         if self._stroke is not None and self._stroke.command is not None:

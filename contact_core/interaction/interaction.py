@@ -10,7 +10,7 @@ if interaction.advance():            # once a frame, before drawing: the live so
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from contact_core.errors import ContactError, InvalidInput
@@ -40,11 +40,13 @@ class Interaction(Holding):
     """One artist at one session, in one or several views. It is for the session's thread.
 
     session: what is edited. meters_per_unit: of the world that views look at. A tool is in the hand from the start:
-    `select`, or the first that is offered.
+    `select`, or the first that is offered. beside: the pose that follows a drag is solved on a thread, so that
+    `advance` does not wait for it.
     """
 
-    def __init__(self, session: Session, *, meters_per_unit: float = 1.0) -> None:
+    def __init__(self, session: Session, *, meters_per_unit: float = 1.0, beside: bool = False) -> None:
         super().__init__(session, meters_per_unit)
+        self._beside = beside
         self.worker = Worker()
         self.proposing = Proposing(self.desk, self.worker)
         self.film = FilmDesk(self.desk)
@@ -197,7 +199,7 @@ class Interaction(Holding):
     def _begin(self, gesture: Gesture, button: str) -> None:
         """button: which ends it; "none" where the next press does."""
         self._gesture, self._button, self._hover = gesture, button, NOTHING
-        self._live = LiveSolve(self.desk)
+        self._live = LiveSolve(self.desk, beside=self._beside)
         self._touch("overlay", "status")
 
     def _in_gesture(self, gesture: Gesture, event: Pointer) -> bool:
@@ -234,6 +236,8 @@ class Interaction(Holding):
             self._touch("selection", "visibility")
 
     def _over(self) -> None:
+        if self._live is not None:
+            self._live.close()
         self._gesture, self._live, self._button = None, None, "none"
         self._touch("overlay", "status")
 
@@ -271,6 +275,13 @@ class Interaction(Holding):
                     return  # the gesture was the last thing done
             self._own_actions().get(action, lambda: EDITS[action](self.desk))()
         self._touch("overlay", "selection", "status", "settings", "visibility", "work", "film")
+
+    def solve_frames(self, frames: Sequence[float]) -> None:
+        """Begin to solve frames beside the window; see `Proposing.solve_frames`, and what it raises."""
+        self.cancel()
+        self._refusal = self.desk.remark = ""
+        self.proposing.solve_frames(frames)
+        self._touch("overlay", "status", "work")
 
     def _own_actions(self) -> dict[str, Callable[[], object]]:
         settings = self.settings

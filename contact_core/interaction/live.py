@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument
-from contact_core.edit.command import Command, Macro
+from contact_core.edit.command import Command
 from contact_core.edit.commands import SetPose
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.grasping.filled import KeepOutOfHollowsTerm
+from contact_core.interaction.work import Worker
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
 from contact_core.progress import Progress
 from contact_core.rig.rig import Pose
@@ -46,17 +47,18 @@ class LiveSolve:
     kept from step to step (`PoseProblem.continued`), and each step starts from the pose before. So a step makes a
     few iterations, and the next one goes on until the pose has settled.
 
-    milliseconds: of the last step. solves: how many there were; tests guard the cost by counting.
+    beside: steps are made on a thread, one at a time: `follow` begins one for the newest preview and takes it over
+    when it is done, and never waits. Rigs that only their host evaluates are asked on the session's thread all the
+    same. milliseconds: of the last step. solves: how many there were; tests guard the cost by counting.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, desk: Desk, *, beside: bool = False) -> None:
+        self._desk, self._worker = desk, Worker() if beside else None
         self._start: Mapping[str, Pose] = dict(desk.document.poses)
         self._last = self._start
         self._contacts = KeptContacts(desk.session)
         self._seen: tuple[object, ...] = self._asked_of(desk.document)
         self._done: Command | None = None
-        self._edit: Command | None = None
         self._pinned: tuple[PoseTerm, ...] = ()
         self._warm: tuple[tuple[object, ...], PoseProblem] | None = None
         self._theta: FloatArray | None = None
@@ -68,11 +70,11 @@ class LiveSolve:
     def is_due(self) -> bool:
         """Whether the gesture previews something that no solve has followed yet, or to the end."""
         desk = self._desk
-        if desk.pins and (desk.pins is not self._pinned or not self._settled):
+        if self._is_under_way or (desk.pins and (desk.pins is not self._pinned or not self._settled)):
             return True
-        if not desk.settings.live or desk.settled or desk.command is None:
+        if not desk.settings.live or desk.settled or desk.edit is None:
             return False
-        return desk.command is not self._done or not self._settled
+        return desk.edit is not self._done or not self._settled
 
     def finish(self) -> None:
         """Follow until the pose has settled, or for as many iterations as a solve beside the window may make.
@@ -80,6 +82,10 @@ class LiveSolve:
         The problem is made anew for it: what a term keeps while contacts are dragged (which hollows are filled) is
         then as a solve after the gesture has it.
         """
+        if self._worker is not None:
+            self._worker.wait()
+            self._worker.poll()
+            self._worker = None
         self._to_the_end = True
         self._settled = self._settled and self._converged and not self.solves
         self._warm = None
@@ -87,49 +93,51 @@ class LiveSolve:
             if not self.follow():
                 return
 
+    def close(self) -> None:
+        """The gesture is over: no step goes on."""
+        if self._worker is not None:
+            self._worker.close()
+
     def follow(self) -> bool:
-        """One step for what is previewed, and preview the pose with it; whether there was anything to do.
+        """Preview the pose of a step that is done, and go on with one for what is previewed now; whether there was
+        anything to show.
 
         Raises InvalidInput for settings and plugins that do not fit the problem.
         """
-        desk = self._desk
-        if not self.is_due:
-            return False
-        if desk.command is not self._done:
-            self._edit = desk.command
-        self._done, self._pinned = desk.command, desk.pins
+        shown = self._worker is not None and self._worker.poll()
+        if self._is_under_way or not self.is_due:
+            return shown
+        return self._begin() or shown
+
+    @property
+    def _is_under_way(self) -> bool:
+        return self._worker is not None and self._worker.status is not None
+
+    def _begin(self) -> bool:
+        """Make a step for what is previewed now, or let the thread make it; whether a pose is shown already."""
+        desk, began = self._desk, time.perf_counter()
+        self._done, self._pinned = desk.edit, desk.pins
         asked = self._asked_of(desk.document)
         if _same(asked, self._seen) and self._settled:
             return self._preview({n: p for n, p in self._last.items() if p is not self._start.get(n)})
         self._seen = asked
-        began = time.perf_counter()
-        poses = self._solved(desk.document)
-        self._last = {**self._last, **poses}
-        shown = self._preview(poses)
-        self.milliseconds, self.solves = 1e3 * (time.perf_counter() - began), self.solves + 1
-        return shown
-
-    def _preview(self, poses: Mapping[str, Pose]) -> bool:
-        """Preview the edit with poses; whether there are any."""
-        if not poses:
-            return False
-        posing = tuple(SetPose(name, pose) for name, pose in poses.items())
-        title = "Pose " + ", ".join(poses) if self._edit is None else self._edit.label()
-        self._done = Macro(title, (*(() if self._edit is None else (self._edit,)), *posing))
-        self._desk.stroke.do(self._done)
-        return True
-
-    def _asked_of(self, document: ContactDocument) -> tuple[object, ...]:
-        """What a solve depends on, by identity: contacts, where surfaces stand, pins."""
-        return (*self._contacts.of(document), *document.surfaces.values(), *self._desk.pins)
-
-    def _solved(self, document: ContactDocument) -> dict[str, Pose]:
-        """Poses by surface for a document, none where nothing pulls on a rig."""
-        problem = self._problem(document)
+        problem = self._problem(desk.document)
         if problem is None or not len(problem.start):
             self._settled = self._converged = True
-            return {}
-        solution = self._stepped(problem)
+            return False
+        step = self._step(problem)
+        if self._worker is None or any(body.black_box is not None for body in problem.bodies):
+            return self._take(step(), began)
+
+        def take(found: tuple[PoseSolution, float]) -> None:
+            self._take(found, began)
+
+        self._worker.begin("Follow", lambda _: step(), take)
+        return False
+
+    def _take(self, found: tuple[PoseSolution, float], began: float) -> bool:
+        """Preview what a step found; whether there is any pose."""
+        solution, self._damping = found
         self._theta = solution.theta
         gained = solution.start_value - solution.value
         little = (
@@ -138,15 +146,30 @@ class LiveSolve:
         self._idle = 0 if gained > 0.0 else self._idle + 1
         self._converged = solution.status is not SolveStatus.STOPPED
         self._settled = self._converged or little or self._idle >= _MOST_IDLE
-        return poses_of(solution, self._desk.session.rigs)
+        poses = poses_of(solution, self._desk.session.rigs)
+        self._last = {**self._last, **poses}
+        shown = self._preview(poses)
+        self.milliseconds, self.solves = 1e3 * (time.perf_counter() - began), self.solves + 1
+        return shown
 
-    def _stepped(self, problem: PoseProblem) -> PoseSolution:
-        settings = self._desk.settings
+    def _preview(self, poses: Mapping[str, Pose]) -> bool:
+        """Let poses follow the edit; whether there are any."""
+        if poses:
+            self._desk.stroke.follow(tuple(SetPose(name, pose) for name, pose in poses.items()))
+        return bool(poses)
+
+    def _asked_of(self, document: ContactDocument) -> tuple[object, ...]:
+        """What a solve depends on, by identity: contacts, where surfaces stand, pins."""
+        return (*self._contacts.of(document), *document.surfaces.values(), *self._desk.pins)
+
+    def _step(self, problem: PoseProblem) -> Callable[[], tuple[PoseSolution, float]]:
+        """What makes the step, of values only: the solution, and the damping to go on with."""
+        settings, damping = self._desk.settings, self._damping
         if settings.solver is None:
-            solution, self._damping = few_steps(problem, settings.iterations, self._damping)
-            return solution
+            return lambda: few_steps(problem, settings.iterations, damping)
         solver: PoseSolver = self._desk.made(POSE_SOLVERS, settings.solver)
-        return solver.solve(problem, SolveOptions(max_iterations=settings.iterations, candidates=("current",)))
+        options = SolveOptions(max_iterations=settings.iterations, candidates=("current",))
+        return lambda: (solver.solve(problem, options), damping)
 
     def _problem(self, document: ContactDocument) -> PoseProblem | None:
         """The problem of a document: that of the last step with what is new, or made anew where it is another."""

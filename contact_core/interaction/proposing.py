@@ -14,6 +14,7 @@ from contact_core.plugins.registry import GRASP_SAMPLERS
 from contact_core.progress import Progress
 from contact_core.proposals.draft import Draft
 from contact_core.scene.problem import Objective
+from contact_core.solve.solver import SolveStatus
 from contact_core.solve.terms import paper_terms
 
 if TYPE_CHECKING:
@@ -44,7 +45,13 @@ class Proposing:
             return self._suggested
         residuals = self.proposal.after.patches.values()
         worst = max((residual.p95 for residual in residuals), default=0.0)
-        return f"proposed: contacts within {worst:.3g}; Enter keeps it, Escape leaves it"
+        what = "stopped, the best so far" if self.is_cut_short else "proposed"
+        return f"{what}: contacts within {worst:.3g}; Enter keeps it, Escape leaves it"
+
+    @property
+    def is_cut_short(self) -> bool:
+        """Whether what is proposed is what a solve had when it was cancelled."""
+        return self.proposal is not None and self.proposal.after.status is SolveStatus.CANCELLED
 
     @property
     def _suggested(self) -> str:
@@ -146,10 +153,9 @@ class Proposing:
         from contact_core.proposals.proposal import SolveSettings
 
         session, settings = self._desk.session, self._desk.settings
-        if not session.document.pairs:
-            raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
+        self._check_pairs()
         self.dismiss()
-        objective, solver = self._objective(), settings.solver
+        objective, solver = self.objective(), settings.solver
         start, derived, rigs = session.document, session.derived.apart(), dict(session.rigs)
         read = session.binding.read(start)  # as the scene has it; the host is asked here and not on the thread
 
@@ -161,24 +167,35 @@ class Proposing:
 
     def solve_film(self, frames: Sequence[float] | None = None) -> None:
         """Begin to solve the film, or some of its frames, as a whole. Raises CommandRejected without a range."""
-        from contact_core.interaction.film_solving import film_work
-
-        session, film = self._desk.session, self._desk.session.timeline
+        film = self._desk.session.timeline
         if film.settings.first == film.settings.last:
             raise CommandRejected("the film has one frame: say its last frame first.")
-        if not session.document.pairs:
-            raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
+        self.solve_frames(film.settings.frames() if frames is None else frames)
+
+    def solve_frames(self, frames: Sequence[float]) -> None:
+        """Begin to solve frames as a whole, whether or not they are the film's.
+
+        Raises CommandRejected without a pair.
+        """
+        from contact_core.interaction.film_solving import film_work
+
+        session = self._desk.session
+        self._check_pairs()
         self.dismiss()
-        chosen = film.settings.frames() if frames is None else tuple(frames)
-        work = film_work(session, chosen, self._objective(), self._desk.settings.solver)
+        work = film_work(session, tuple(frames), self.objective(), self._desk.settings.solver)
         self._worker.begin("Solve the film", work, self.show)
 
-    def _objective(self) -> Objective:
+    def objective(self) -> Objective:
+        """What a pose is solved for, as the settings say: the paper's terms, and those that keep a hand a hand."""
         settings = self._desk.settings
         terms = paper_terms(prior=settings.prior_weight) + body_terms(self._desk)
         if settings.prior == "rest":
             return Objective(terms)
         return Objective(terms, prior=dict(self._desk.session.document.poses))
+
+    def _check_pairs(self) -> None:
+        if not self._desk.session.document.pairs:
+            raise CommandRejected("there is no pair yet, so nothing pulls on the hand: pair two patches first.")
 
     def show(self, proposal: Proposal) -> None:
         """Show a proposal in place of the document, until it is accepted or dismissed.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
@@ -10,7 +10,9 @@ from mathutils import Matrix
 
 from contact_blender.host import BlenderHost as BlenderHost
 from contact_core.rig.rig import Rig
-from contact_core.testing.host_scenes import HostScene
+
+if TYPE_CHECKING:
+    from contact_core.testing.host_scenes import HostScene  # which needs pytest; a Blender with a window has none
 
 
 def build(scene: HostScene) -> BlenderHost:

@@ -14,6 +14,7 @@ def test_its_steps_end_in_a_pose_on_the_timeline(
 ) -> None:
     from contact_blender import extension
     from contact_core.cli import main
+    from contact_core.grasping.judging import verdict
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     monkeypatch.chdir(tmp_path)
@@ -27,7 +28,9 @@ def test_its_steps_end_in_a_pose_on_the_timeline(
             exec(compile(block, f"tutorial-blender.md, block {number}", "exec"), names)
             if number == 4:
                 near = dict(extension.shared.held().residuals)
-        assert len(near) == 3 and max(near.values()) < 0.008, near  # the page says 6 to 7 mm
+                judged = verdict(extension.shared.session())
+        assert len(near) == 3 and max(near.values()) < 0.005, near  # the page says 4 mm
+        assert judged.is_grasp, judged.failures
         assert (tmp_path / "grasp.blend").is_file()
         session = extension.shared.session()
         assert len(session.document.pairs) == 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -179,33 +180,111 @@ def test_solving_beside_the_window(window: Window) -> Iterator[Any]:
 
 @in_window
 def test_what_a_move_of_the_mouse_costs(window: Window) -> Iterator[Any]:
-    """Tells milliseconds of our own work in a drag, drawing not counted; no handler of the depsgraph is there."""
+    """Tells milliseconds of our own work in a drag, drawing not counted, by the clock and by the processor time of
+    the window's thread. The solver has another; nothing hears the depsgraph, nothing works when nothing moves."""
     yield from scene(window)
     from contact_blender.extension import shared
+    from contact_core.interaction.live import LiveSolve
 
     take_up(window, "paint")
     yield from window.drag(way(window, *FINGER))
-    artist, spent = shared.artist(), {"move": [], "advance": []}
-    for name in spent:
-        original = getattr(artist, name)
+    artist, spent, solved = shared.artist(), Spent(window), list[float]()
+    for name in ("move", "advance", "_show_poses"):
+        spent.watch(artist, name)
+    make, threads = LiveSolve._step, set[str]()
 
-        def timed(*given: Any, _run: Any = original, _into: Any = spent[name]) -> None:
-            began = time.perf_counter()
-            _run(*given)
-            _into.append(1e3 * (time.perf_counter() - began))
+    def watched(live: Any, problem: Any) -> Any:
+        step = make(live, problem)
 
-        setattr(artist, name, timed)
+        def run() -> Any:
+            began = time.thread_time()
+            threads.add(threading.current_thread().name)
+            found = step()
+            solved.append(1e3 * (time.thread_time() - began))
+            return found
+
+        return run
+
+    LiveSolve._step = watched
     take_up(window, "transfer")
-    yield from window.drag(way(window, *BALL, BALL[0], BALL[1], BALL[0]))
+    path = way(window, *BALL, BALL[0], BALL[1], BALL[0])
+    yield from window.move(*path[0])
+    window.send("LEFTMOUSE", "PRESS")
+    yield
+    for place in path[1:]:
+        yield from window.move(*place)
+    yield 20
+    assert len(spent.clock["move"]) > 15 and threads == {"contact Follow"}, threads
+    written = len(spent.clock["_show_poses"])
+    yield 20
+    assert len(spent.clock["_show_poses"]) == written, "bones are written though nothing has moved"
+    window.send("LEFTMOUSE", "RELEASE")
     yield 5
-    assert len(spent["move"]) > 15
-    for name, times in spent.items():
-        times.sort()
-        middle, most = times[len(times) // 2], times[int(0.95 * len(times))]
-        window.said.append(f"{name}: {len(times)} times, p50 {middle:.1f} ms, p95 {most:.1f} ms")
+    spent.tell()
+    window.said.append(f"steps of the pose: {len(solved)}, {_spread(solved)} of the processor on a thread")
     ours = [each for each in window.bpy.app.handlers.depsgraph_update_post if "contact" in str(each.__module__)]
     assert not ours
     built = artist.drawing.rebuilt
     for _ in range(5):
         window.draw()
     assert artist.drawing.rebuilt == built, "batches are made anew though nothing has changed"
+
+
+@in_window
+def test_a_ghost_of_what_has_not_moved_is_not_seen(window: Window) -> Iterator[Any]:
+    """Where a proposal leaves the skin alone its ghost lies in the skin, and must not show through in stripes."""
+    import numpy as np
+
+    yield from scene(window)
+    from contact_blender.extension import shared
+    from contact_core.interaction.overlay import NOTHING, Ghost, Overlay
+
+    take_up(window, "paint")
+    yield from window.drag(way(window, *FINGER))
+    yield from window.move(5, 5)
+    artist = shared.artist()
+    skin = artist.interaction.desk.scene.surfaces["finger"]
+    ghost = Ghost(skin.points, skin.mesh.faces, (0.0, 1.0, 0.0), 1.0)
+    artist.drawing.replace(NOTHING)
+    without = window.pixels().astype(int)
+    artist.drawing.replace(Overlay(ghosts=(ghost,)))
+    same = window.pixels().astype(int)
+    beside = Ghost(skin.points + np.array([0.0, 0.0, 1.0]), skin.mesh.faces, (0.0, 1.0, 0.0), 1.0)
+    artist.drawing.replace(Overlay(ghosts=(beside,)))
+    seen = window.pixels().astype(int)
+    striped, whole = (int((abs(each - without).max(axis=2) > 40).sum()) for each in (same, seen))
+    window.said.append(f"a ghost in the skin changes {striped} pixels, beside it {whole}")
+    assert whole > 2000 and striped < 0.03 * whole, (striped, whole)
+
+
+class Spent:
+    """What calls of methods take on the window's thread."""
+
+    def __init__(self, window: Window) -> None:
+        self.window = window
+        self.clock: dict[str, list[float]] = {}
+        self.processor: dict[str, list[float]] = {}
+
+    def watch(self, owner: Any, name: str) -> None:
+        original, clock, processor = getattr(owner, name), [], []
+        self.clock[name], self.processor[name] = clock, processor
+
+        def timed(*given: Any) -> None:
+            began, busy = time.perf_counter(), time.thread_time()
+            original(*given)
+            clock.append(1e3 * (time.perf_counter() - began))
+            processor.append(1e3 * (time.thread_time() - busy))
+
+        setattr(owner, name, timed)
+
+    def tell(self) -> None:
+        for name in self.clock:
+            self.window.said.append(
+                f"{name}: {len(self.clock[name])} times, {_spread(self.processor[name])} of the processor,"
+                f" {_spread(self.clock[name])} by the clock"
+            )
+
+
+def _spread(times: list[float]) -> str:
+    ordered = sorted(times)
+    return f"p50 {ordered[len(ordered) // 2]:.1f} ms, p95 {ordered[int(0.95 * len(ordered))]:.1f} ms"

@@ -125,6 +125,18 @@ def test_the_film_is_solved_beside_the_window_and_a_drag_solves_what_is_round_it
     assert hand.worker.status is None
 
 
+def test_frames_that_are_cancelled_give_the_best_so_far_or_say_so(hand: Interaction) -> None:
+    session = hand.session
+    before = session.document
+    hand.solve_frames(range(25))
+    assert hand.worker.status is not None
+    hand.do("edit.cancel")
+    assert hand.worker.wait(60.0)
+    hand.advance()
+    assert hand.proposing.is_cut_short or "cancelled" in hand.status.refusal
+    assert session.document is before and f"pose/{ARM}" not in session.timed_document.tracks
+
+
 def test_a_film_without_a_range_or_a_pair_is_refused_in_words(hand: Interaction) -> None:
     hand.session.pairs.remove("touch")
     with pytest.raises(CommandRejected, match="no pair yet"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -15,6 +16,7 @@ from contact_core.document.document import ContactDocument
 from contact_core.document.schema import document_to_json
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.view import world_per_pixel
 from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, POSE_SOLVERS, TOOLS
 from contact_core.scene.problem import Objective, problem_of
@@ -290,15 +292,64 @@ def test_only_the_newest_state_is_solved_for() -> None:
     assert "hand" in artist.session.document.poses
 
 
+def test_beside_the_loop_the_hand_follows_as_within_it() -> None:
+    """Steps on a thread: `advance` begins one for the newest, the edit waits for none and keeps the pose."""
+    for beside in (False, True):
+        artist = paired()
+        artist.hands.close()
+        hands = artist.hands = Interaction(artist.session, beside=beside)
+        hands.take_up("move")
+        hands.select(surface="ball")
+        start = on_copy(artist)
+        artist.press(start)
+        for step in range(1, 20):
+            artist.move(start + by(step, 0.0))
+            hands.advance()
+        live = hands._live
+        assert live is not None and (beside or live.solves == 19)
+        while hands.is_due:
+            hands.advance()
+        shown = hands.desk.document
+        assert "hand" in shown.poses and (live.solves < 40 or not beside)
+        artist.move(start + by(20.0, 0.0))  # the hand stays where it is until the next step is done
+        assert hands.desk.document.poses["hand"] is shown.poses["hand"] and hands.desk.document is not shown
+        hands.advance()
+        artist.release(start + by(20.0, 0.0))
+        assert_solved(artist)
+
+
+def assert_solved(artist: Artist) -> None:
+    """A full solve from the pose of the document finds nothing better."""
+    objective = Objective((*paper_terms(), PenetrationTerm()))
+    problem = problem_of(artist.session.geometry, artist.session.rigs, objective)
+    full = LevenbergMarquardt().solve(problem, SolveOptions(max_iterations=500, candidates=("current",)))
+    assert full.start_value <= 1.01 * full.value + 1e-9, (full.start_value, full.value)
+
+
+def test_a_step_beside_the_loop_ends_with_the_gesture() -> None:
+    artist = paired()
+    artist.hands.close()
+    hands = artist.hands = Interaction(artist.session, beside=True)
+    hands.take_up("move")
+    hands.select(surface="ball")
+    before = artist.session.document
+    start = on_copy(artist)
+    artist.press(start)
+    artist.move(start + by(9.0, 0.0))
+    hands.advance()
+    assert hands.is_due
+    artist.key("Escape")
+    assert not hands.is_due
+    assert artist.session.document is before and hands.desk.document is before
+    assert not [each for each in threading.enumerate() if each.name == "contact Follow"]
+
+
 def test_letting_go_leaves_the_hand_where_a_full_solve_does() -> None:
     artist = paired()
     artist.hands.take_up("move")
     artist.hands.select(surface="ball")
     artist.drag(*(on_copy(artist) + 4.0 * SPOT))
-    objective = Objective((*paper_terms(), PenetrationTerm()))
-    problem = problem_of(artist.session.geometry, artist.session.rigs, objective)
-    full = LevenbergMarquardt().solve(problem, SolveOptions(max_iterations=500, candidates=("current",)))
-    assert full.start_value <= 1.01 * full.value + 1e-9, (full.start_value, full.value)
+    assert_solved(artist)
 
 
 def test_without_live_the_hand_stays() -> None:

@@ -15,18 +15,12 @@ import contact_core as contact
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
-from contact_core.geometry.transform import transform_points
 from contact_core.grasping.filled import KeepOutOfHollowsTerm
-from contact_core.grasping.metrics import Contact, PosedScene, measure
-from contact_core.grasping.verdict import Verdict, judge
+from contact_core.grasping.judging import verdict
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.lesson import STEPS, Lesson
 from contact_core.interaction.view import Perspective
 from contact_core.plugins.registry import TOOLS
-from contact_core.rig.bones import bone_segments
-from contact_core.rig.rig import forward_kinematics, skin
-from contact_core.session import Session
-from contact_core.solve.body import manipulator_length
 from contact_core.testing.artist import Artist, ball_and_hand, block, shifted
 
 MUG = np.array([0.14811, 0.0, 0.0])  # where it stands, beside the hand
@@ -89,24 +83,6 @@ def keys_of(lesson: Lesson, step: str) -> list[str]:
     """The keys that the card of a step names, in their order."""
     assert STEPS[lesson.number].name == step, lesson.card()
     return re.findall("`([^`]+)`", lesson.card().words)
-
-
-def verdict(session: Session) -> Verdict:
-    """On the hand as it is posed, by the usual limits."""
-    rig, mug, pose = session.rigs["hand"], session.geometry.mesh("mug"), session.document.poses["hand"]
-    local = np.asarray(pose.local[[pose.joints.index(name) for name in rig.joints]])
-    own = forward_kinematics(rig.parents, local)
-    there = np.linalg.inv(session.document.surfaces["mug"].world_from_surface)
-    posed = TriangleMesh(transform_points(there, skin(rig, own)), rig.faces)
-    contacts = {p.pair.name: Contact(p.manipulator_points, p.object_points) for p in session.geometry.pairs()}
-    metrics = measure(
-        PosedScene(
-            rest=rig.surface, skin=posed, bones=bone_segments(rig.parents, there @ own), rest_local=rig.rest_local,
-            local=local, moving=rig.parents >= 0, object_mesh=mug, solids=(mug,), contacts=contacts,
-            length=manipulator_length(rig),
-        )
-    )  # fmt: skip
-    return judge(metrics, {}, {})
 
 
 @pytest.mark.parametrize("view", [FRONT, ASKEW], ids=["front", "askew"])

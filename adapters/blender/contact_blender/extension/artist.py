@@ -18,6 +18,7 @@ from contact_core.edit.listeners import DocumentChanged
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.interaction import Interaction
 from contact_core.plugins.registry import TOOLS
+from contact_core.rig.rig import Pose
 from contact_core.session import Session
 
 PREFIX = "contact."  # of the ids of our tools
@@ -34,10 +35,11 @@ class Artist:
 
     def __init__(self, session: Session) -> None:
         self.session, self.host = session, session.host
-        self.interaction = Interaction(session, meters_per_unit=self.host.space().meters_per_unit)
+        self.interaction = Interaction(session, meters_per_unit=self.host.space().meters_per_unit, beside=True)
         self.drawing = drawn.Drawing(self.is_shown)
         self.busy = False
         self._looked = 0.0
+        self._previewed: dict[str, Pose] = {}  # what bones show, by surface
         self._configured: dict[str, dict[str, Any]] = {}
         self._panel_patch = ""
         self._macro: contextlib.ExitStack | None = None
@@ -47,6 +49,7 @@ class Artist:
         """Put back what is under way and draw no more; the session stays."""
         self._stop_listening()
         if self.session.host is None:  # its scene has gone, and the bones with it
+            self._previewed = {}
             self.host.forget_previews()
             self._macro = None
         else:
@@ -128,7 +131,7 @@ class Artist:
     def release(self, pointer: Pointer, view: RegionView) -> None:
         """End the gesture: one step of undo, or none where it is refused."""
         before = self.session.document
-        self.host.end_previews()  # the step that is written starts from the scene as it was
+        self._end_previews()  # the step that is written starts from the scene as it was
         try:
             self.interaction.handle(pointer, view)
         finally:
@@ -148,20 +151,20 @@ class Artist:
 
     def cancel(self) -> None:
         """Put back everything: document, bones, selection."""
-        self.host.end_previews()
+        self._end_previews()
         self.interaction.cancel()
         self._end_macro(kept=False)
         self.show()
 
     def accept(self) -> None:
         """Keep what is proposed, as one step. Raises ContactError."""
-        self.host.end_previews()
+        self._end_previews()
         self.interaction.do("edit.accept")
         self.show()
 
     def leave(self) -> None:
         """Stop the work and leave what is proposed."""
-        self.host.end_previews()
+        self._end_previews()
         self.interaction.worker.drop()
         self.interaction.proposing.dismiss()
         self.show()
@@ -170,9 +173,17 @@ class Artist:
         """An action of the table. Raises ContactError."""
         self.look()
         self.configure()
-        self.host.end_previews()
+        self._end_previews()
         self.interaction.do(action)
         settings.follow(bpy.context, self.interaction)
+        self.show()
+
+    def solve_frames(self, first: int, last: int) -> None:
+        """Begin to solve frames beside the window, as a whole. Raises ContactError."""
+        self.look()
+        self.configure()
+        self._end_previews()
+        self.interaction.solve_frames(range(first, last + 1))
         self.show()
 
     # -- what is seen ----------------------------------------------------------------------------------------
@@ -199,13 +210,22 @@ class Artist:
         desk = self.interaction.desk
         shown, base = desk.document.poses, desk.base.poses
         bound = self.session.binding.surfaces
-        previewed = [n for n in bound if n in self.session.rigs and shown.get(n) is not base.get(n)]
+        previewed = {
+            name: shown[name]
+            for name in bound
+            if name in self.session.rigs and name in shown and shown[name] is not base.get(name)
+        }
         if not previewed:
-            self.host.end_previews()
-        for name in previewed:
-            pose = shown.get(name)
-            if pose is not None:
+            self._end_previews()
+        for name, pose in previewed.items():
+            if self._previewed.get(name) is not pose:
                 self.host.preview_pose(bound[name].object_id, pose)
+        self._previewed = previewed
+
+    def _end_previews(self) -> None:
+        """Put the bones back as the scene has them."""
+        self._previewed = {}
+        self.host.end_previews()
 
     # -- inside ----------------------------------------------------------------------------------------------
 
@@ -238,6 +258,7 @@ class Artist:
 
     def _heard(self, change: DocumentChanged) -> None:
         if change.origin == "host" and change.kind != "preview":
+            self._previewed = {}
             self.host.forget_previews()
         if not self.busy and change.kind != "preview":
             self.show()

@@ -23,13 +23,18 @@ _made: list[Any] = []
 
 
 def operator(
-    name: str, label: str, needs: str = "", /, beside: Callable[[Any, Any], str] | None = None, **properties: Any
+    name: str,
+    label: str,
+    needs: str = "",
+    /,
+    beside: Callable[[Any, Any], dict[str, Any]] | None = None,
+    **properties: Any,
 ) -> Callable[[Action], Action]:
     """Make `bpy.ops.contact.NAME` of a function (session, context, properties) that returns what it did, in words.
 
     needs: "mesh" (active), "patch", "two" (patches) or "pair"; without it the button is grey and says why.
-    beside: given context and properties, the action of the table that a button or a key begins beside the window in
-    place of the function, "" for none.
+    beside: given context and properties, the arguments of `contact.propose` with which a button or a key begins the
+    work beside the window in place of the function, none where it has to wait.
     """
 
     def declare(action: Action) -> Action:
@@ -46,9 +51,9 @@ def operator(
         def invoke(self: Any, context: Any, event: Any) -> set[str]:
             if not event.type or event.type == "NONE":  # a script said INVOKE_DEFAULT without a window
                 return _run(self, context, action)
-            instead = "" if beside is None else beside(context, self)
+            instead = {} if beside is None else beside(context, self)
             if instead:  # goes on by itself, and its step is its own
-                bpy.ops.contact.propose("INVOKE_DEFAULT", action=instead, at_once=True)
+                bpy.ops.contact.propose("INVOKE_DEFAULT", at_once=True, **instead)
                 return {"CANCELLED"}
             return _run(self, context, action, by_blender=True)
 

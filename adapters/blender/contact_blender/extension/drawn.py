@@ -16,11 +16,13 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from contact_core.arrays import FloatArray
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.interaction.overlay import NOTHING, Handle, Overlay, StrokeTint
 
 _LINE, _PAIR, _DOT = 2.0, 1.0, 5.0  # pixels of a plain screen
 _THROUGH = 0.18  # how strongly contacts show that something hides
 _GHOSTS = "LESS"  # their depth test, by which they are known: only their front is drawn, or it would show through
+_WITHIN = 0.002  # of its size, how far a ghost lies within its surface
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 33)
 _RIM = (0.05, 0.05, 0.05, 0.9)
 Part = tuple[FloatArray, tuple[float, ...]]  # ends of segments, and their colour
@@ -102,7 +104,8 @@ def _batches(overlay: Overlay, points: Any, faces: Any) -> list[Batch]:
     made: list[Batch] = []
     for ghost in overlay.ghosts:
         if len(ghost.triangles):
-            made.append(_triangles(ghost.points, ghost.triangles, (*ghost.color, ghost.opacity)))
+            within = _shrunk(ghost.points, ghost.triangles)
+            made.append(_triangles(within, ghost.triangles, (*ghost.color, ghost.opacity)))
         else:
             made.append(_points([ghost.points], [(*ghost.color, 0.8)]))
     if overlay.tint is not None and points is not None:
@@ -110,6 +113,13 @@ def _batches(overlay: Overlay, points: Any, faces: Any) -> list[Batch]:
     made += _decals(overlay)
     made += _lines(overlay)
     return made
+
+
+def _shrunk(points: FloatArray, triangles: Any) -> FloatArray:
+    """(n, 3) a surface a little within itself. Where a proposal leaves the skin alone its ghost lies in the skin
+    that Blender draws, whose points differ in the last digits: it would show through in stripes."""
+    mesh = TriangleMesh(points, triangles)
+    return np.asarray(points - _WITHIN * mesh.bounding_box_diagonal * mesh.vertex_normals)
 
 
 def _decals(overlay: Overlay) -> list[Batch]:

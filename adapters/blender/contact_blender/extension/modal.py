@@ -23,6 +23,7 @@ _NAVIGATION = frozenset(
     ("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "WHEELINMOUSE", "WHEELOUTMOUSE", "TRACKPADPAN",
      "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM", "NDOF_MOTION", *(f"NUMPAD_{digit}" for digit in range(10)))
 )  # fmt: skip
+_LEFT = "Stopped: pose and contacts are as they were"
 _PREPARING = "Contact is being made ready; the first time on a machine that takes a minute or two"
 
 
@@ -219,6 +220,11 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
     at_once: bpy.props.BoolProperty(  # type: ignore[valid-type]  # so Blender declares
         name="Keep at once", description="Keep what is found without asking", options={"SKIP_SAVE"}
     )
+    keyed: bpy.props.BoolProperty(  # type: ignore[valid-type]  # so Blender declares
+        name="Key frames", description="Solve the frames and key them", options={"SKIP_SAVE"}
+    )
+    first: bpy.props.IntProperty(name="First frame", default=1)  # type: ignore[valid-type]  # so Blender declares
+    last: bpy.props.IntProperty(name="Last frame", default=1)  # type: ignore[valid-type]  # so Blender declares
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -228,6 +234,7 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
         return not reason
 
     _waits = False  # for the libraries, before the solver can begin
+    _stopped = False  # by Escape, while it worked
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         WARMING.begin()
@@ -235,10 +242,16 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
             artist = shared.artist()
             self._waits = not WARMING.is_done
             if not self._waits:
-                artist.do(self.action)
+                self._begin(artist)
         except Exception as error:
             return self._failed(context, error)
         return self._start(context, artist)
+
+    def _begin(self, artist: Any) -> None:
+        if self.keyed:
+            artist.solve_frames(self.first, self.last)
+        else:
+            artist.do(self.action)
 
     def _event(self, context: Any, event: Any) -> set[str]:
         artist = shared.artist()
@@ -271,7 +284,7 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
             return self._end(context, "CANCELLED")
         if WARMING.is_done:
             self._waits = False
-            artist.do(self.action)
+            self._begin(artist)
         self._say(context, f"{_PREPARING} ({WARMING.doing}) · Esc cancels" if self._waits else artist.status())
         return {"PASS_THROUGH"}
 
@@ -283,6 +296,8 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
             self._put_back()
             return self._end(context, "CANCELLED")
         if hands.proposing.proposal is None and hands.worker.status is None:
+            if self._stopped:
+                self.report({"INFO"}, _LEFT)
             return self._end(context, "CANCELLED")  # an edit meanwhile made it void, or nothing was found
         if self.at_once and hands.proposing.proposal is not None and hands.worker.status is None:
             return self._kept(context, artist)
@@ -295,12 +310,15 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
         return self._end(context, "FINISHED")
 
     def _left(self, context: Any, artist: Any) -> set[str]:
-        """Escape: the work stops and gives the best that it has; once more leaves that."""
+        """Escape: the work stops, and what it has is shown, to be kept or left; once more leaves it. What a button
+        began would be kept at once, and is left."""
         hands = artist.interaction
         if hands.worker.status is not None and hands.proposing.proposal is None and not self.at_once:
+            self._stopped = True
             hands.do("edit.cancel")
-            return {"RUNNING_MODAL"}
+            return self._after(context, artist) if hands.worker.status is None else {"RUNNING_MODAL"}
         artist.leave()
+        self.report({"INFO"}, _LEFT)
         return self._end(context, "CANCELLED")
 
     def _line(self, hands: Any) -> str:

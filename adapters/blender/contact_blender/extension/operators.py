@@ -300,12 +300,15 @@ def recolor(session: Any, context: Any, given: Any) -> str:
     return f"{patch} has another colour."
 
 
-def _solve_beside(context: Any, given: Any) -> str:
-    """One pose is solved for beside the window; frames, which pose the scene one after the other, are not."""
-    if given.keyed:
-        return ""
+def _solve_beside(context: Any, given: Any) -> dict[str, Any]:
+    """A pose, or all frames; frames of a rig that only Blender evaluates are asked on no thread, and wait."""
     context.window_manager.contact_tools.all.penetration = given.penetration
-    return "pose.solve"
+    if not given.keyed:
+        return {"action": "pose.solve"}
+    session = shared.session()
+    if session.binding.evaluated(sorted(session.rigs)):
+        return {}
+    return {"action": "pose.solve", "keyed": True, "first": given.first, "last": given.last}
 
 
 @operator(
@@ -313,23 +316,23 @@ def _solve_beside(context: Any, given: Any) -> str:
     "Solve Pose",
     "pair",
     beside=_solve_beside,
-    penetration=BoolProperty(name="Penetration", description="Keep skin out of what is solid", default=False),
+    penetration=BoolProperty(name="Penetration", description="Keep skin out of what is solid", default=True),
     keyed=BoolProperty(name="Key frames", description="Solve the frames and key them", default=False),
     first=IntProperty(name="First frame", default=1),
     last=IntProperty(name="Last frame", default=1),
 )
 def solve(session: Any, context: Any, given: Any) -> str:
     """Pose the rig so that all pairs touch; with frames, solve and key all of them at once."""
-    terms = _depth(session) if given.penetration else ()
+    context.window_manager.contact_tools.all.penetration = given.penetration
     frames = range(given.first, given.last + 1) if given.keyed else None
-    return _accepted(session, session.solve(frames=frames, terms=terms, progress=session.host))
+    return _accepted(session, session.solve(frames=frames, settings=_telling(session)))
 
 
 @operator(
     "settle",
     "Settle Contacts",
     "pair",
-    beside=lambda context, given: "pose.settle",
+    beside=lambda context, given: {"action": "pose.settle"},
     rounds=IntProperty(name="Rounds", default=2, min=1, max=20),
 )
 def settle(session: Any, context: Any, given: Any) -> str:
@@ -337,7 +340,7 @@ def settle(session: Any, context: Any, given: Any) -> str:
     return _accepted(session, session.settle(rounds=given.rounds, settings=_telling(session)))
 
 
-@operator("slide", "Slide Contacts", "pair", beside=lambda context, given: "pose.slide")
+@operator("slide", "Slide Contacts", "pair", beside=lambda context, given: {"action": "pose.slide"})
 def slide(session: Any, context: Any, given: Any) -> str:
     """Solve the pose with each contact free to slide a little over its object."""
     return _accepted(session, session.slide(settings=_telling(session)))
@@ -354,17 +357,12 @@ def clear_pose(session: Any, context: Any, given: Any) -> str:
 
 
 def _telling(session: Any) -> Any:
-    """Settings of a solve that shows its progress."""
+    """Settings of a solve that shows its progress, with the terms that it has beside the window."""
     from contact_core.proposals.proposal import SolveSettings
 
-    return SolveSettings(progress=session.host)
-
-
-def _depth(session: Any) -> tuple[str, ...]:
-    """The name of the term that keeps skin out of solids."""
-    from contact_core.plugins.registry import POSE_TERMS
-
-    return (session.plugins.name_for(POSE_TERMS, "depth"),)
+    artist = shared.artist()
+    artist.configure()
+    return SolveSettings(progress=session.host, objective=artist.interaction.proposing.objective())
 
 
 def _accepted(session: Any, proposal: Any) -> str:
