@@ -157,4 +157,5 @@ def contact_cli() -> list[object]:
         "contact_builtins.cli.repair:Repair",
         "contact_builtins.cli.demo:Demo",
         "contact_gallery.command:GalleryCommand",
+        "contact_gallery.survey.command:SurveyCommand",
     ]

@@ -97,6 +97,7 @@ def _make(one: Figure, folder: Path, plugins: PluginManager, progress: Progress,
         "pictures": [path.name for path in pictures],
         "captions": [[picture.caption for picture in row.pictures] for row in sheet.rows],
         "measures": [asdict(measure) for measure in sheet.measures],
+        "efforts": [asdict(effort) for effort in sheet.efforts],
     }
     write_atomic(folder / f"{one.name}.json", json.dumps(record, indent=1, ensure_ascii=False) + "\n")
     return record

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ from pathlib import Path
 from contact_core.document.asset import Asset
 from contact_core.edit.operation_log import OperationLog
 from contact_core.errors import InvalidInput
+from contact_core.job.job import Job
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.scene.picture import Picture
@@ -25,6 +27,17 @@ class Measure:
     what: str
     paper: str
     here: str
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a pose took. tools: how often each was used, by the first words of the history ("paint", "transfer").
+    seconds: of the machine, from the first operation to the last; a person's looking and thinking is not in it."""
+
+    pose: str
+    tools: dict[str, int]
+    undos: int
+    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +56,7 @@ class Sheet:
     progress: Progress = NO_PROGRESS
     rows: list[Row] = field(default_factory=list)
     measures: list[Measure] = field(default_factory=list)
+    efforts: list[Effort] = field(default_factory=list)
     operations: int = 0
     undos: int = 0
 
@@ -64,9 +78,16 @@ class Sheet:
         found = sorted(Path(folder).rglob(name)) if folder else []
         return read_asset(found[0], self.plugins) if found else None
 
+    def recipe(self, pose: str, job: Job) -> None:
+        """What a recipe did counts as what an artist would do: its strokes, transfers and pairs, and one solve."""
+        words = [step.command.label().split()[0].lower() for step in job.session.history.done]
+        tools = Counter(word for word in words if word in ("paint", "transfer", "pair")) + Counter(solve=1)
+        self.operations += tools.total()
+        self.efforts.append(Effort(pose, dict(tools), 0, sum(job.seconds.values())))
+
     @contextmanager
-    def counting(self, session: Session) -> Iterator[OperationLog]:
-        """What is done to the session within counts as an artist's operations."""
+    def counting(self, session: Session, pose: str = "") -> Iterator[OperationLog]:
+        """What is done to the session within counts as an artist's operations, and as what the named pose took."""
         log = OperationLog(session)
         try:
             yield log
@@ -75,3 +96,5 @@ class Sheet:
             summary = log.summary()
             self.operations += summary["operations"]
             self.undos += summary["undos"]
+            if pose:
+                self.efforts.append(Effort(pose, summary["tools"], summary["undos"], summary["seconds"]))

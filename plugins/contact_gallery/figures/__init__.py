@@ -8,6 +8,7 @@ from __future__ import annotations
 
 ORDER = (
     "tool_overview",
+    "geodesics",
     "parameterisation",
     "sampling",
     "tentacle_wrap",

@@ -4,7 +4,7 @@ Four finger pads and the thumb's hang on the palm: one geodesic each, from axis 
 carry the whole tree, and every pad lies down on what it meets: the crown and cheeks of the head, the flanks of the
 body.
 
-The Stanford bunny itself stands below where `CONTACT_ASSETS` has it.
+The Stanford bunny itself is measured where `CONTACT_ASSETS` has it, and not pictured: its licence is for research.
 """
 
 import numpy as np
@@ -45,7 +45,7 @@ def draw(sheet: Sheet) -> None:
         bunny = sheet.asset("stanford_bunny_7k_closed.obj")
         if bunny is not None:
             session.surfaces.add("bunny", standing(bunny.mesh))
-            sheet.show(*carried(sheet, session, "bunny", BUNNY), aspect=1.3)
+            carried(sheet, session, "bunny", BUNNY)
 
 
 def carried(

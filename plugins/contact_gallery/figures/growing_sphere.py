@@ -25,25 +25,24 @@ def draw(sheet: Sheet) -> None:
         knuckles = [rig.rest_world[rig.joint_index(f"{f}_proximal"), :3, 3] for f in ("index", "little")]
         near = np.array([(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)])
         pictures, prior = [], contact.Pose.rest(rig)
-        with sheet.counting(session):
+        with sheet.counting(session, "Six contacts, one tree"):
             over = np.array(knuckles) + np.array([0.0, -0.016, 0.02])
             session.patches.brush("disk", "palm", surface="hand", at=over, radius=0.009, spacing=0.0016)
             for tip in TIPS:
                 paint_pad(session, "hand", tip, tip)
                 session.patches.link(tip, "palm", parent_point=len(session.geometry.axis("palm")) // 2)
-            for letter, (ball, radius) in zip("abcd", RADII.items(), strict=True):
+        for letter, (ball, radius) in zip("abcd", RADII.items(), strict=True):
+            with sheet.counting(session, f"Sphere of {200 * radius:.1f} cm"):
                 start = Locator.of(session.geometry.mesh(ball)).closest([(0.035, 0.0, -1.0)]).points
                 copies = session.patches.transfer_tree("palm", ball, start, direction=(-1.0, 0.0, 0.0))
                 pairs = [session.pairs.add(patch, copy) for patch, copy in copies.items()]
                 proposal = session.solve(pairs=pairs, prior={"hand": prior}, terms=["penetration"])
                 session.accept(proposal)
-                prior = proposal.poses["hand"]
-                caption = f"({letter}) {200 * radius:.1f} cm"
-                pictures.append(
-                    view(session, "hand", ball, caption=caption, camera_from=(1.0, 0.35, 0.5), focus=near)
-                )
-                mean = 1000.0 * np.mean([pair.mean for pair in proposal.after.patches.values()])
-                deep = 1000.0 * deepest(session, "hand", ball)
-                told = f"contacts {mean:.1f} mm apart, skin {deep:.1f} mm deep, {proposal.after.seconds:.2f} s"
-                sheet.measure(f"sphere of {200 * radius:.1f} cm", told, "one key of four, in under 45 minutes")
+            prior = proposal.poses["hand"]
+            caption = f"({letter}) {200 * radius:.1f} cm"
+            pictures.append(view(session, "hand", ball, caption=caption, camera_from=(1.0, 0.35, 0.5), focus=near))
+            mean = 1000.0 * np.mean([pair.mean for pair in proposal.after.patches.values()])
+            deep = 1000.0 * deepest(session, "hand", ball)
+            told = f"contacts {mean:.1f} mm apart, skin {deep:.1f} mm deep, {proposal.after.seconds:.2f} s"
+            sheet.measure(f"sphere of {200 * radius:.1f} cm", told, "one key of four, in under 45 minutes")
         sheet.show(*pictures, aspect=0.85)

@@ -33,7 +33,7 @@ def draw(sheet: Sheet) -> None:
             there = mug.cast([np.array(start) / 1000.0], [way]).points
             session.pairs.add(name, session.patches.transfer(name, "mug", there, direction=direction), name=name)
 
-        with sheet.counting(session):
+        with sheet.counting(session, "Hand on a mug's handle"):
             session.surfaces.place("mug", in_hand)
             session.surfaces.set_pose("hand", curled)
             for finger, height in FINGERS.items():

@@ -57,16 +57,18 @@ def draw(sheet: Sheet) -> None:
 
         pictures: list[Picture] = []
         claims = ("", "2 translations, 1 rotation", "3 translations")
-        with sheet.counting(session):
+        with sheet.counting(session, "Knuckleball"):
             for pad, (along, start) in PADS.items():
                 paint_pad(session, "hand", pad, pad, along=along)
                 copy = session.patches.transfer(pad, "ball", on_ball(start), name=f"{pad} there", direction=AHEAD)
                 session.pairs.add(pad, copy, name=pad)
             solved("(a) knuckleball")
+        with sheet.counting(session, "Two-seam fastball, from it"):
             session.patches.translate("index_distal there", on_ball((0.3, 0.85, 0.45)))
             session.patches.translate("middle_distal there", on_ball((-0.15, 0.9, 0.45)))
             session.patches.rotate("thumb_distal there", np.radians(20.0))
             solved("(b) two-seam fastball")
+        with sheet.counting(session, "Curveball, from that"):
             session.patches.translate("index_distal there", on_ball((-0.05, 0.95, 0.4)))
             session.patches.translate("middle_distal there", on_ball((-0.45, 0.8, 0.45)))
             session.patches.translate("thumb_distal there", on_ball((0.7, -0.7, 0.0)))

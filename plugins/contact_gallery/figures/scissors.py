@@ -29,7 +29,7 @@ def draw(sheet: Sheet) -> None:
         degrees |= {"thumb_metacarpal.x": -29, "thumb_metacarpal.y": -34, "thumb_metacarpal.z": 17}
         half_closed = set_angles(rig, contact.Pose.rest(rig), {dof: np.radians(a) for dof, a in degrees.items()})
         in_hand = np.array([[0, 1, 0, 0.09], [0, 0, -1, 0.12], [-1, 0, 0, 0.09], [0, 0, 0, 1]])
-        with sheet.counting(session):
+        with sheet.counting(session, "Hand in scissors"):
             session.surfaces.place("scissors", in_hand)
             session.surfaces.set_pose("hand", half_closed)
             for name, (bone, along, inside, way) in PADS.items():

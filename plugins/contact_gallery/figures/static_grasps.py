@@ -1,7 +1,8 @@
 """Grasps of four manipulators: human, witch, alien, tentacle.
 
 Each is a recipe: pads by joint, roughly how the object lies in the hand, and what a grasp has to reach to be called
-one. `contact pose RECIPE.toml --out DIR` runs the same recipes from the command line.
+one, stretched skin and depth included. `contact pose RECIPE.toml --out DIR` runs the same recipes from the command
+line.
 """
 
 from importlib.resources import files
@@ -25,8 +26,13 @@ WRAPS: tuple[tuple[str, int, Vector, Vector, Vector], ...] = (
     ("pole", 5, (0.05, 0.3, 0.0), (0.0, 0.4, 1.0), (1.0, 0.3, 0.7)),
     ("mug", 10, (0.03, 0.03, 0.05), (-1.0, 0.1, 0.3), (0.2, 0.5, 1.0)),
     ("baseball", 12, (0.0, 0.0, 0.05), (-1.0, 0.3, 0.0), (0.3, 0.4, 1.0)),
+    ("rabbit", 8, (-0.06, 0.09, 0.0), (0.0, 0.15, 1.0), (-0.5, 0.4, 1.0)),
 )
-ROWS = (("mug", "baseball", "pole"), ("witch", "witch_pole", "witch_ball"), ("alien", "alien_ball", "alien_mug"))
+ROWS = (
+    ("mug", "baseball", "pole", "human_rabbit"),
+    ("witch", "witch_pole", "witch_ball", "witch_rabbit"),
+    ("alien", "alien_ball", "alien_mug", "alien_rabbit"),
+)
 
 
 def draw(sheet: Sheet) -> None:
@@ -35,8 +41,7 @@ def draw(sheet: Sheet) -> None:
         for name in names:
             recipe = recipe_of(name)
             job = perform(recipe, sheet.plugins)
-            steps = [step.command.label().split()[0] for step in job.session.history.done]
-            sheet.operations += sum(word in ("Paint", "Transfer", "Pair") for word in steps) + 1  # and the solve
+            sheet.recipe(recipe.title, job)
             geometry = job.session.geometry
             thing, standing = geometry.mesh("object"), job.session.document.surface("object").world_from_surface
             touched = np.concatenate([pair.object_points.positions(thing) for pair in geometry.pairs()])
@@ -62,8 +67,8 @@ def draw(sheet: Sheet) -> None:
             told = f"contacts {apart:.1f} % of a hand apart, skin {deep:.1f} % deep, {job.seconds['solve']:.2f} s"
             judged = "a grasp" if job.verdict.is_grasp else job.verdict.failures[0]
             sheet.measure(recipe.title, f"{told}; {judged}")
-        sheet.show(*pictures, aspect=1.2)
-    sheet.show(*(wrapped(sheet, *wrap) for wrap in WRAPS), aspect=1.2)
+        sheet.show(*pictures)
+    sheet.show(*(wrapped(sheet, *wrap) for wrap in WRAPS))
 
 
 def wrapped(sheet: Sheet, thing: str, first: int, start: Vector, way: Vector, camera: Vector) -> Picture:
@@ -75,7 +80,7 @@ def wrapped(sheet: Sheet, thing: str, first: int, start: Vector, way: Vector, ca
         strokes = [
             contact.BrushGesture(skin, along[k : k + 2], radius=w, spacing=0.35 * w) for k, w in enumerate(widths)
         ]
-        with sheet.counting(session):
+        with sheet.counting(session, f"The tentacle takes a {thing}"):
             session.patches.brush("disk", "strip", *strokes, surface="tentacle", axis=along)
             root = Locator.of(session.geometry.mesh("thing")).closest([start]).points
             copy = session.patches.transfer("strip", "thing", root, direction=way)
@@ -86,7 +91,8 @@ def wrapped(sheet: Sheet, thing: str, first: int, start: Vector, way: Vector, ca
         apart, deep = proposal.after.patches["strip"].mean / 0.006, deepest(session, "tentacle", "thing") / 0.006
         told = f"contacts {apart:.1f} % of its length apart, skin {deep:.1f} % deep, {proposal.after.seconds:.2f} s"
         sheet.measure(f"The tentacle takes a {thing}", told)
-        near = session.geometry.posed_mesh("tentacle").points
+        held = session.geometry.points(copy).positions(session.geometry.mesh("thing"))
+        near = np.concatenate([held - 0.07, held + 0.07])
         return view(session, camera_from=camera, caption=f"The tentacle takes a {thing}", focus=near, axes=False)
 
 

@@ -44,7 +44,7 @@ def draw(sheet: Sheet) -> None:
         pictures = [look(caption="(a) the strip on the pole", frame=["tentacle"])]
         for letter, degrees in zip("bcd", (40.0, 27.0, 16.0), strict=True):
             session.goto(start)
-            with sheet.counting(session):
+            with sheet.counting(session, f"Tentacle round a pole, {degrees:.0f}°"):
                 rise = np.tan(np.radians(degrees))
                 session.patches.place(copy, root, direction=(0.0, rise, 1.0))
                 proposal = session.solve(solver="progressive")
