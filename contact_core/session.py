@@ -20,6 +20,7 @@ from contact_core.edit.listeners import DocumentChanged, Listener, Listeners
 from contact_core.edit.open_document import OpenDocument, real_path
 from contact_core.edit.open_edits import OpenEdits
 from contact_core.edit.open_macro import OpenMacro
+from contact_core.edit.operation_log import log_when_asked
 from contact_core.edit.recovery import journal_path
 from contact_core.edit.stroke import Stroke
 from contact_core.edit.verbs import ContactSets, Film, Pairs, Patches
@@ -109,6 +110,7 @@ class Session(GraspingSession):
             self.history = self._bound(self.history, surfaces, objects)
             link.listen()  # last: a session that refuses its document leaves nothing behind in the host
             self._host_link = link
+        log_when_asked(self)
 
     def _bound(
         self, history: History, told: Mapping[str, str] | None = None, objects: Iterable[str] | None = ()

@@ -45,8 +45,8 @@ def _overview(made: Sequence[tuple[Figure, Mapping[str, Any]]]) -> list[str]:
 EFFORTS = """## Operations and seconds per pose {: #efforts }
 
 What the paper's appendix tells of its users, without people: what each pose of the figures took, logged by the
-session itself (`contact_core.edit.operation_log`, which anyone can switch on: opt-in, local, plain JSON). Contacts
-that a pose takes over from the pose before are not painted again. Seconds are those of the machine, from the first
+session itself. Anyone can switch that on, by `CONTACT_OPERATIONS=FILE`: local, plain JSON, no names. Contacts that
+a pose takes over from the pose before are not painted again. Seconds are those of the machine, from the first
 operation to the last; the looking and thinking of a person is not in them. The paper's five users took 4.6 to 17.7
 minutes per pose, all of them people's time, so the two are no comparison; the count of operations is one.
 

@@ -114,3 +114,19 @@ def test_the_operation_log_counts_what_is_done_and_undone_and_names_nobody(tmp_p
     assert times == sorted(times) and kept["seconds"] == times[-1]
     text = (tmp_path / "log.json").read_text(encoding="utf-8")
     assert "private" not in text and "secret" not in text
+
+
+def test_a_session_adds_a_line_per_operation_where_it_was_asked_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "operations.jsonl"
+    for asked in (None, str(path), str(path), str(tmp_path)):  # a folder cannot be written: the edit goes on
+        monkeypatch.setenv("CONTACT_OPERATIONS", asked or "")
+        with contact.new(secret="sample:baseball", plugins=[contact_builtins], discover=False) as session:
+            session.patches.brush("disk", "private", surface="secret", at=[(0.04, 0.0, 0.0)], radius=0.01)
+            session.undo()
+            assert not session.document.patches
+    assert "the log of operations ends here" in caplog.text
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    assert [(one["tool"], one["kind"]) for one in lines] == 2 * [("paint", "do"), ("paint", "undo")]
+    assert len({one["session"] for one in lines}) == 2 and all(one["at"] >= 0.0 for one in lines)

@@ -22,11 +22,12 @@ from contact_gallery.sheet import Sheet
 
 PAPER = "Figures 1, 6 and 8"
 Vector = tuple[float, float, float]
+LARGE = 0.5  # metres: of what is larger, the picture shows where it is held
 WRAPS: tuple[tuple[str, int, Vector, Vector, Vector], ...] = (
     ("pole", 5, (0.05, 0.3, 0.0), (0.0, 0.4, 1.0), (1.0, 0.3, 0.7)),
     ("mug", 10, (0.03, 0.03, 0.05), (-1.0, 0.1, 0.3), (0.2, 0.5, 1.0)),
     ("baseball", 12, (0.0, 0.0, 0.05), (-1.0, 0.3, 0.0), (0.3, 0.4, 1.0)),
-    ("rabbit", 8, (-0.06, 0.09, 0.0), (0.0, 0.15, 1.0), (-0.5, 0.4, 1.0)),
+    ("chair", 8, (0.25, 0.2, 0.2), (0.0, 0.35, 1.0), (1.0, 0.3, 0.9)),
 )
 ROWS = (
     ("mug", "baseball", "pole", "human_rabbit"),
@@ -44,9 +45,10 @@ def draw(sheet: Sheet) -> None:
             sheet.recipe(recipe.title, job)
             geometry = job.session.geometry
             thing, standing = geometry.mesh("object"), job.session.document.surface("object").world_from_surface
-            touched = np.concatenate([pair.object_points.positions(thing) for pair in geometry.pairs()])
+            small = thing.bounding_box_diagonal < LARGE
+            shown = [thing.points] if small else [pair.object_points.positions(thing) for pair in geometry.pairs()]
             around = np.concatenate(
-                [transform_points(standing, touched), geometry.posed_mesh("manipulator").points]
+                [transform_points(standing, np.concatenate(shown)), geometry.posed_mesh("manipulator").points]
             )
             kind = recipe.manipulators[0].source.sample or ""
             skin = next((color for word, color in LOOKS.items() if kind.startswith(word)), SKIN)
