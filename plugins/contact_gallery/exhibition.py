@@ -81,9 +81,9 @@ def exhibit(
 
 def _make(one: Figure, folder: Path, plugins: PluginManager, progress: Progress, width: int) -> dict[str, Any]:
     """One figure: run it, draw it, keep what it measured."""
-    sheet, began = Sheet(plugins, progress), time.perf_counter()
+    sheet, began = Sheet(plugins, progress), time.process_time()
     one.draw(sheet)
-    seconds = time.perf_counter() - began
+    seconds = time.process_time() - began
     progress.tell(0.8, f"{one.title}: drawing")
     renderer = best_renderer(plugins)
     pictures = [

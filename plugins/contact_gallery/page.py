@@ -12,7 +12,7 @@ HEAD = """# Gallery
 
 Every figure of the paper ("Contact Edit", TOG 2023), made again by a short script through the
 public interface, on assets that come with the package, and measured. `contact gallery --all --out DIR` makes this
-page; `contact gallery NAME --out DIR` makes one figure. Seconds are those of the script on one core, reading,
+page; `contact gallery NAME --out DIR` makes one figure. Seconds are those of a processor for the script: reading,
 painting, transferring and solving included, drawing left out. Operations are what an artist has to do: strokes,
 edits, transfers, pairings, solves.
 """
@@ -46,7 +46,7 @@ EFFORTS = """## Operations and seconds per pose {: #efforts }
 
 What the paper's appendix tells of its users, without people: what each pose of the figures took, logged by the
 session itself. Anyone can switch that on, by `CONTACT_OPERATIONS=FILE`: local, plain JSON, no names. Contacts that
-a pose takes over from the pose before are not painted again. Seconds are those of the machine, from the first
+a pose takes over from the pose before are not painted again. Seconds are a processor's, from the first
 operation to the last; the looking and thinking of a person is not in them. The paper's five users took 4.6 to 17.7
 minutes per pose, all of them people's time, so the two are no comparison; the count of operations is one.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,7 +33,7 @@ class Measure:
 @dataclass(frozen=True)
 class Effort:
     """What a pose took. tools: how often each was used, by the first words of the history ("paint", "transfer").
-    seconds: of the machine, from the first operation to the last; a person's looking and thinking is not in it."""
+    seconds: a processor's, from the first operation to the last; a person's looking and thinking is not in it."""
 
     pose: str
     tools: dict[str, int]
@@ -78,17 +79,17 @@ class Sheet:
         found = sorted(Path(folder).rglob(name)) if folder else []
         return read_asset(found[0], self.plugins) if found else None
 
-    def recipe(self, pose: str, job: Job) -> None:
+    def recipe(self, pose: str, job: Job, seconds: float) -> None:
         """What a recipe did counts as what an artist would do: its strokes, transfers and pairs, and one solve."""
         words = [step.command.label().split()[0].lower() for step in job.session.history.done]
         tools = Counter(word for word in words if word in ("paint", "transfer", "pair")) + Counter(solve=1)
         self.operations += tools.total()
-        self.efforts.append(Effort(pose, dict(tools), 0, sum(job.seconds.values())))
+        self.efforts.append(Effort(pose, dict(tools), 0, seconds))
 
     @contextmanager
     def counting(self, session: Session, pose: str = "") -> Iterator[OperationLog]:
         """What is done to the session within counts as an artist's operations, and as what the named pose took."""
-        log = OperationLog(session)
+        log = OperationLog(session, clock=time.process_time)
         try:
             yield log
         finally:

@@ -14,6 +14,7 @@ from contact_core.cli import main
 from contact_core.edit.operation_log import OperationLog
 from contact_core.plugins.manager import PluginManager
 from contact_gallery.exhibition import exhibit, figure, names
+from contact_gallery.page import page
 
 FAST = ("geodesics", "parameterisation", "sampling", "contact_models", "bulk_transfer")
 PICTURE, PICTURES = 200_000, 4_000_000  # bytes at most
@@ -77,6 +78,19 @@ def test_the_paper_s_claims_on_transfer_hold(made: tuple[Path, dict[str, dict[st
     assert (
         float(lost[0].removesuffix(" cubes")) < 1e-9
     )  # a chain leads back behind a corner, a straight line does not
+
+
+def test_the_page_counts_what_each_pose_took() -> None:
+    effort = {
+        "pose": "A grip",
+        "tools": {"paint": 2, "rotate": 1, "pair": 2, "solve": 1},
+        "undos": 3,
+        "seconds": 1.26,
+    }
+    record = {"pictures": ["x.jpg"], "captions": [["x"]], "measures": [], "seconds": 2.0, "operations": 6}
+    written = page([(figure("mug_handle"), {**record, "efforts": [effort]})])
+    assert "| [A grip](#mug_handle) | 2 | 0 | 1 | 2 | 1 | 6 | 3 | 1.3 |" in written
+    assert "Operations and seconds" not in page([(figure("mug_handle"), record)])
 
 
 def test_an_unknown_figure_is_one_sentence_and_nothing_is_made(

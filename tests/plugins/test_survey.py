@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import math
+import shutil
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -85,6 +89,48 @@ def test_what_people_preferred_is_found_behind_the_sides(folders: tuple[Path, Pa
     for row in rows:
         assert row["votes"] == [12, 0, 4] and row["score"] == [3.5, 0.5]
         assert row["p_votes"] == pytest.approx(2 * 0.5**12) and row["p_pairs"] == pytest.approx(0.25)
+
+
+def test_the_page_asks_everybody_in_another_order_and_its_answers_fit_the_key(
+    folders: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """In a real browser, offline: who prefers red clicks on what is red, and nothing is asked for elsewhere."""
+    key, _ = make_survey(folders, tmp_path / "out", seed=7)
+    sides, asked, orders, saved = {pair.number: pair.first for pair in key.pairs}, list[str](), set(), []
+    with chromium(tmp_path) as browser:
+        for person in range(2):
+            page = browser.new_page()
+            page.on("request", lambda request: asked.append(request.url))
+            page.goto((tmp_path / "out" / "sheets" / "index.html").as_uri())
+            for section in page.locator("section").all():
+                first, _ = (shown.get_attribute("src") for shown in section.locator("img").all())
+                number, side = first.removesuffix(".png").split("-")
+                red = sides[int(number)] ^ ("first", "second").index(side)  # 0 where the left one is red
+                for question in section.locator("fieldset").all():
+                    question.locator("input").nth(red).check()
+            orders.add(page.content())
+            with page.expect_download() as download:
+                page.click("#save")
+            saved.append(tmp_path / f"{person}.json")
+            download.value.save_as(saved[-1])
+    assert len(orders) == 2 and all(url.startswith(("file:", "blob:")) for url in asked)
+    assert {tuple(row["votes"]) for row in tally(key, read_answers(saved, key))} == {(8, 0, 0)}
+
+
+@contextlib.contextmanager
+def chromium(folder: Path) -> Iterator[Any]:
+    """A headless Chromium of this system, without the limit of memory that the tests have: it reserves more."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright (extra dev) drives the browser")
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        pytest.skip("there is no Chromium here: apt-get install chromium")
+    program = folder / "chromium"
+    program.write_text(f'#!/bin/sh\nulimit -S -v unlimited\nexec {found} "$@"\n')
+    program.chmod(0o755)
+    with api.sync_playwright() as playwright:
+        made = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield made
+        made.close()
 
 
 def test_the_binomial_test_is_the_sum_of_all_that_is_no_likelier() -> None:

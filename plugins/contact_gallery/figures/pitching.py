@@ -22,31 +22,36 @@ PADS = {  # pad: how far along the last bone, and where on the ball it starts: t
     "middle_distal": (0.75, (-0.2, 0.9, -0.15)),
     "ring_distal": (0.4, (-0.9, -0.25, 0.35)),
 }
+TRIES = 5  # of each solve, the quickest of which is told: a busy machine shows in the others
 AHEAD = (0.0, 0.0, 1.0)  # the way the fingers point
 
 
 def draw(sheet: Sheet) -> None:
     with contact.new(hand="sample:human_hand", ball="sample:baseball", plugins=sheet.plugins) as session:
         rig, ball = session.rigs["hand"], Locator.of(session.geometry.mesh("ball"))
-        degrees = {f"{finger}_{bone}.z": 25 for finger in ("index", "middle") for bone in ("proximal", "distal")}
-        degrees |= {
-            "index_intermediate.z": 60,
-            "middle_intermediate.z": 60,
-            "ring_intermediate.z": 60,
+        folded = {
             "ring_proximal.z": 40,
+            "ring_intermediate.z": 60,
+            "little_proximal.z": 50,
+            "little_intermediate.z": 70,
         }
-        degrees |= {"little_intermediate.z": 70, "little_proximal.z": 50}
-        curled = set_angles(rig, contact.Pose.rest(rig), {dof: np.radians(a) for dof, a in degrees.items()})
+        bent = {"proximal.z": 25, "intermediate.z": 60, "distal.z": 25}
+        knuckles = {f"{finger}_{bone}": a for finger in ("index", "middle") for bone, a in bent.items()}
+        relaxed, curled = (
+            set_angles(rig, contact.Pose.rest(rig), {dof: np.radians(a) for dof, a in degrees.items()})
+            for degrees in (folded, folded | knuckles)
+        )
 
         def on_ball(direction: tuple[float, float, float]) -> contact.SurfacePoints:
             return ball.closest([0.05 * np.array(direction)]).points
 
         def solved(caption: str) -> None:
-            began = time.process_time()
-            proposal = session.solve(
-                prior={"hand": curled} if "knuckle" in caption else "rest", terms=["penetration"]
-            )
-            cost = f"solved in {1000 * (time.process_time() - began):.0f} ms of a processor"
+            prior, spent = {"hand": curled if "knuckle" in caption else relaxed}, []
+            for _ in range(TRIES):
+                began = time.process_time()
+                proposal = session.solve(prior=prior, terms=["penetration"])
+                spent.append(1000.0 * (time.process_time() - began))
+            cost = f"solved in {min(spent):.0f} ms of a processor"
             session.accept(proposal)
             pictures.append(view(session, caption=caption, camera_from=(0.45, 0.8, 1.0), frame=["hand", "ball"]))
             mean = 1000.0 * np.mean([pair.mean for pair in proposal.after.patches.values()])

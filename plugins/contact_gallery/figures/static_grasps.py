@@ -5,6 +5,7 @@ one, stretched skin and depth included. `contact pose RECIPE.toml --out DIR` run
 line.
 """
 
+import time
 from importlib.resources import files
 
 import numpy as np
@@ -41,8 +42,9 @@ def draw(sheet: Sheet) -> None:
         pictures = []
         for name in names:
             recipe = recipe_of(name)
+            began = time.process_time()
             job = perform(recipe, sheet.plugins)
-            sheet.recipe(recipe.title, job)
+            sheet.recipe(recipe.title, job, time.process_time() - began)
             geometry = job.session.geometry
             thing, standing = geometry.mesh("object"), job.session.document.surface("object").world_from_surface
             small = thing.bounding_box_diagonal < LARGE
