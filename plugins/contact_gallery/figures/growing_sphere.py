@@ -23,7 +23,7 @@ def draw(sheet: Sheet) -> None:
             session.surfaces.add(name, meshes.icosphere(4, radius))
         rig = session.rigs["hand"]
         knuckles = [rig.rest_world[rig.joint_index(f"{f}_proximal"), :3, 3] for f in ("index", "little")]
-        near = np.array([(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)])
+        near = np.array([(-0.11, -0.1, -0.11), (0.11, 0.1, 0.12)])
         pictures, prior = [], contact.Pose.rest(rig)
         with sheet.counting(session, "Six contacts, one tree"):
             over = np.array(knuckles) + np.array([0.0, -0.016, 0.02])
