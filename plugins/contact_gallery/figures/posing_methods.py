@@ -17,7 +17,8 @@ from contact_builtins.demos import demo_recipe
 from contact_builtins.solvers.nlopt_solver import NLoptSolver
 from contact_core.job.run import prepare
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
-from contact_core.solve.solver import patch_residuals
+from contact_core.solve.problem import PoseProblem
+from contact_core.solve.solver import PoseSolver, patch_residuals
 from contact_core.solve.terms import paper_terms
 from contact_gallery.looks import deepest, view
 from contact_gallery.sheet import Sheet
@@ -30,7 +31,7 @@ CLAIMS = {"area": "the reference", "curve": "palm goes in", "point": "unnatural 
 def draw(sheet: Sheet) -> None:
     job = prepare(demo_recipe("mug"), sheet.plugins)
     session, full = job.session, job.session.problem()
-    forms = {
+    forms: dict[str, tuple[PoseSolver, PoseProblem]] = {
         "here": (LevenbergMarquardt(), full),
         "paper": (NLoptSolver(preset="paper"), session.problem(contact.Objective(limits="paper"))),
     }
