@@ -13,8 +13,8 @@ HEAD = """# Gallery
 Every figure of the paper ("Contact Edit", TOG 2023), made again by a short script through the
 public interface, on assets that come with the package, and measured. `contact gallery --all --out DIR` makes this
 page; `contact gallery NAME --out DIR` makes one figure. Seconds are those of a processor for the script: reading,
-painting, transferring and solving included, drawing left out. Operations are what an artist has to do: strokes,
-edits, transfers, pairings, solves.
+painting, transferring and solving included, drawing left out; so are those in the tables. Operations are what an
+artist has to do: strokes, edits, transfers, pairings, solves.
 """
 
 

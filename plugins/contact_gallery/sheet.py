@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from contact_core.document.asset import Asset
 from contact_core.edit.operation_log import OperationLog
@@ -18,6 +19,14 @@ from contact_core.plugins.manager import PluginManager
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.scene.picture import Picture
 from contact_core.session import Session
+
+T = TypeVar("T")
+
+
+def timed(work: Callable[[], T]) -> tuple[T, float]:
+    """What some work returns, and the seconds of a processor that it took."""
+    began = time.process_time()
+    return work(), time.process_time() - began
 
 
 @dataclass(frozen=True)

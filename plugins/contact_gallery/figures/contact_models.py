@@ -6,10 +6,7 @@ chain, does not close, and has no points inside. Both rivals are written from th
 model puts the same points. Blue: lengths shrank, red: they grew by two.
 """
 
-import time
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +17,7 @@ from contact_core.rig.poses import set_angles
 from contact_core.scene.picture import PictureMesh
 from contact_gallery.looks import heat_of, on, tube, view
 from contact_gallery.other_models import boundary_alone, single_point
-from contact_gallery.sheet import Sheet
+from contact_gallery.sheet import Sheet, timed
 
 PAPER = "Figure 14"
 
@@ -45,17 +42,12 @@ def draw(sheet: Sheet) -> None:
         near = np.array([(-0.03, 0.24, -0.03), (0.03, 0.52, 0.03)])
         bare = view(session, "pole", patches=[], camera_from=(1.0, 0.25, 0.0), focus=near)
         shape = session.document.shape_of("strip")
-        (_, measuring), (_, carrying), (theirs, one_log), ((chain, length), walking) = map(
-            timed,
-            (
-                lambda: session.patches.set_axis("strip", along),
-                lambda: session.geometry.points(
-                    session.patches.transfer("strip", "pole", root, direction=(0, 1, 1))
-                ),
-                lambda: single_point(skin, points, axis, pole, placed),
-                lambda: boundary_alone(skin, points, axis, shape, pole, placed),
-            ),
+        _, measuring = timed(lambda: session.patches.set_axis("strip", along))
+        _, carrying = timed(
+            lambda: session.geometry.points(session.patches.transfer("strip", "pole", root, direction=(0, 1, 1)))
         )
+        theirs, one_log = timed(lambda: single_point(skin, points, axis, pole, placed))
+        (chain, length), walking = timed(lambda: boundary_alone(skin, points, axis, shape, pole, placed))
         session.undo()
         loop = chain.points.positions(pole)
         pictures = [view(session, "tentacle", camera_from=(0.9, 0.3, -0.6), caption="(a) the strip")]
@@ -91,20 +83,13 @@ def draw(sheet: Sheet) -> None:
             "slow flood fill, no interior",
         )
         times = {
-            "axis model: measured once, then carried in": f"{measuring:.0f} ms, {carrying:.0f} ms",
-            "one log map: measured and carried in": f"{one_log:.0f} ms",
-            "boundary alone: measured and carried in": f"{walking:.0f} ms, and has no interior yet",
+            "axis model: measured once, then carried in": f"{1000 * measuring:.0f} ms, {1000 * carrying:.0f} ms",
+            "one log map: measured and carried in": f"{1000 * one_log:.0f} ms",
+            "boundary alone: measured and carried in": f"{1000 * walking:.0f} ms, and has no interior yet",
         }
         for what, told in times.items():
             sheet.measure(f"{what}, of a processor", told, "real time" if "axis" in what else "")
         sheet.show(*pictures, aspect=0.8)
-
-
-def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What some work returns, and the processor's milliseconds that it took."""
-    began = time.process_time()
-    found = work()
-    return found, 1000.0 * (time.process_time() - began)
 
 
 def curled(sheet: Sheet) -> tuple[contact.TriangleMesh, contact.SurfacePoints]:

@@ -4,7 +4,7 @@ Four pads on the hand, four on the ball, painted once. From one pitch to the nex
 two translations and a rotation first, then three translations, and the pose is solved again from where it is.
 """
 
-import time
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from contact_core.geometry.raycast import Locator
 from contact_core.rig.poses import set_angles
 from contact_core.scene.picture import Picture
 from contact_gallery.looks import deepest, paint_pad, view
-from contact_gallery.sheet import Sheet
+from contact_gallery.sheet import Sheet, timed
 
 PAPER = "Figure 9"
 PADS = {  # pad: how far along the last bone, and where on the ball it starts: to the thumb, up, to the fingers
@@ -48,9 +48,8 @@ def draw(sheet: Sheet) -> None:
         def solved(caption: str) -> None:
             prior, spent = {"hand": curled if "knuckle" in caption else relaxed}, []
             for _ in range(TRIES):
-                began = time.process_time()
-                proposal = session.solve(prior=prior, terms=["penetration"])
-                spent.append(1000.0 * (time.process_time() - began))
+                proposal, seconds = timed(partial(session.solve, prior=prior, terms=["penetration"]))
+                spent.append(1000.0 * seconds)
             cost = f"solved in {min(spent):.0f} ms of a processor"
             session.accept(proposal)
             pictures.append(view(session, caption=caption, camera_from=(0.45, 0.8, 1.0), frame=["hand", "ball"]))

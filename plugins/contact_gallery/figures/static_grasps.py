@@ -5,7 +5,7 @@ one, stretched skin and depth included. `contact pose RECIPE.toml --out DIR` run
 line.
 """
 
-import time
+from functools import partial
 from importlib.resources import files
 
 import numpy as np
@@ -19,7 +19,7 @@ from contact_core.recipe.reader import parse_recipe
 from contact_core.recipe.recipe import Recipe
 from contact_core.scene.picture import Picture
 from contact_gallery.looks import LOOKS, SKIN, deepest, view
-from contact_gallery.sheet import Sheet
+from contact_gallery.sheet import Sheet, timed
 
 PAPER = "Figures 1, 6 and 8"
 Vector = tuple[float, float, float]
@@ -42,9 +42,8 @@ def draw(sheet: Sheet) -> None:
         pictures = []
         for name in names:
             recipe = recipe_of(name)
-            began = time.process_time()
-            job = perform(recipe, sheet.plugins)
-            sheet.recipe(recipe.title, job, time.process_time() - began)
+            job, spent = timed(partial(perform, recipe, sheet.plugins))
+            sheet.recipe(recipe.title, job, spent)
             geometry = job.session.geometry
             thing, standing = geometry.mesh("object"), job.session.document.surface("object").world_from_surface
             small = thing.bounding_box_diagonal < LARGE
@@ -68,7 +67,7 @@ def draw(sheet: Sheet) -> None:
             apart, deep = (
                 100.0 * (job.metrics[key] or 0.0) for key in ("mean_contact_distance", "max_penetration")
             )
-            told = f"contacts {apart:.1f} % of a hand apart, skin {deep:.1f} % deep, {job.seconds['solve']:.2f} s"
+            told = f"contacts {apart:.1f} % of a hand apart, skin {deep:.1f} % deep, {spent:.1f} s in all"
             judged = "a grasp" if job.verdict.is_grasp else job.verdict.failures[0]
             sheet.measure(recipe.title, f"{told}; {judged}")
         sheet.show(*pictures)
@@ -90,10 +89,10 @@ def wrapped(sheet: Sheet, thing: str, first: int, start: Vector, way: Vector, ca
             copy = session.patches.transfer("strip", "thing", root, direction=way)
             session.patches.scale(copy, along=0.8)  # the inner side of a bend is shorter than the skin at rest
             session.pairs.add("strip", copy, name="strip")
-            proposal = session.solve(solver="progressive", terms=["penetration"])
+            proposal, spent = timed(lambda: session.solve(solver="progressive", terms=["penetration"]))
             session.accept(proposal)
         apart, deep = proposal.after.patches["strip"].mean / 0.006, deepest(session, "tentacle", "thing") / 0.006
-        told = f"contacts {apart:.1f} % of its length apart, skin {deep:.1f} % deep, {proposal.after.seconds:.2f} s"
+        told = f"contacts {apart:.1f} % of its length apart, skin {deep:.1f} % deep, {spent:.2f} s"
         sheet.measure(f"The tentacle takes a {thing}", told)
         held = session.geometry.points(copy).positions(session.geometry.mesh("thing"))
         near = np.concatenate([held - 0.07, held + 0.07])

@@ -13,7 +13,7 @@ import contact_core as contact
 from contact_core.arrays import FloatArray
 from contact_core.geometry.raycast import Locator
 from contact_gallery.looks import rotation, view
-from contact_gallery.sheet import Sheet
+from contact_gallery.sheet import Sheet, timed
 
 PAPER = "Figure 5"
 
@@ -47,13 +47,13 @@ def draw(sheet: Sheet) -> None:
             with sheet.counting(session, f"Tentacle round a pole, {degrees:.0f}°"):
                 rise = np.tan(np.radians(degrees))
                 session.patches.place(copy, root, direction=(0.0, rise, 1.0))
-                proposal = session.solve(solver="progressive")
+                proposal, spent = timed(lambda: session.solve(solver="progressive"))
                 session.accept(proposal)
             pictures.append(look(caption=f"({letter}) start angle {degrees:.0f}°", focus=near))
             met = proposal.after.patches["strip - " + copy]
             turns = np.ptp(angle_round(session, copy)) / (2.0 * np.pi)
             wrap = f"{turns:.1f} turns, {100 * met.opposed:.0f} % of the normals opposed"
-            cost = f"contacts {1000 * met.mean:.1f} mm apart, {proposal.after.seconds:.2f} s"
+            cost = f"contacts {1000 * met.mean:.1f} mm apart, {spent:.2f} s"
             sheet.measure(f"start angle {degrees:.0f}°", f"{wrap}, {cost}", "the start angle changes the wrap")
         sheet.show(*pictures, aspect=0.8)
 
