@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -47,6 +48,10 @@ def drag(bpy: Any, artist: Any, tool: str, ends: Any, *, let_go: bool = True) ->
     for pixel in pixels[1:]:
         artist.move(Pointer("move", *pixel), VIEW)
         artist.advance()
+    until = time.monotonic() + 60.0
+    while artist.interaction.is_due and time.monotonic() < until:  # the pose is solved on a thread
+        artist.advance()
+        time.sleep(0.002)
     if let_go:
         artist.release(Pointer("release", *pixels[-1], "left"), VIEW)
 
@@ -89,6 +94,13 @@ def test_every_action_has_an_operator_and_no_key_twice(bpy: Any, artist: Any) ->
         assert hasattr(bpy.types, f"CONTACT_OT_{name}"), action
         for chord in chords.chords_of(action):
             assert chords.item_of(chord)["type"] in keys[0], chord
+
+
+def test_what_runs_beside_the_window_can_be_begun(bpy: Any, artist: Any) -> None:
+    from contact_blender.extension import settings, toolbar
+
+    known = bpy.ops.contact.propose.get_rna_type().properties["action"].enum_items.keys()
+    assert set(toolbar.OF_ITS_OWN) == set(known) <= {action["id"] for action in settings.table()["actions"]}
 
 
 def test_keys_that_blender_needs_are_left_to_it() -> None:

@@ -93,11 +93,14 @@ def drag_field(window: Window) -> Iterator[Any]:
     x, y = region.x + region.width // 2 + 90, region.y + region.height // 2 - 48
     for step in range(6):  # into the panel, and never out of it: that would close it
         yield from window.move(x - 90 + 18 * step, y + 40 - 8 * step)
-        yield 4
+        window.draw()  # a button is under the mouse once it was drawn there
+        yield 3
     window.send("LEFTMOUSE", "PRESS")
     yield 5
+    window.draw()
     for aside in (5, 12, 25, 40):
         yield from window.move(x + aside, y)
-        yield 5
+        window.draw()
+        yield 3
     window.send("LEFTMOUSE", "RELEASE")
     yield 10

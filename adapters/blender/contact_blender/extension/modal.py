@@ -23,6 +23,8 @@ _NAVIGATION = frozenset(
     ("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "WHEELINMOUSE", "WHEELOUTMOUSE", "TRACKPADPAN",
      "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM", "NDOF_MOTION", *(f"NUMPAD_{digit}" for digit in range(10)))
 )  # fmt: skip
+# Actions of the table that run beside the window.
+OF_ITS_OWN = ("pose.solve", "pose.settle", "pose.slide", "pose.suggest", "film.solve", "film.window")
 _LEFT = "Stopped: pose and contacts are as they were"
 _PREPARING = "Contact is being made ready; the first time on a machine that takes a minute or two"
 
@@ -215,7 +217,7 @@ class CONTACT_OT_propose(_Modal, bpy.types.Operator):  # noqa: N801 (Blender's s
     bl_options = {"BLOCKING"}  # noqa: RUF012 (Blender's spelling)
     action: bpy.props.EnumProperty(  # type: ignore[valid-type]  # so Blender declares
         name="What",
-        items=[(f"pose.{each}", each.capitalize(), "") for each in ("solve", "settle", "slide", "suggest")],
+        items=[(each, each.partition(".")[2].capitalize(), "") for each in OF_ITS_OWN],
     )
     at_once: bpy.props.BoolProperty(  # type: ignore[valid-type]  # so Blender declares
         name="Keep at once", description="Keep what is found without asking", options={"SKIP_SAVE"}

@@ -13,7 +13,7 @@ import bpy
 
 from contact_blender.extension import chords, settings, shared
 from contact_blender.extension.declaring import why_not
-from contact_blender.extension.modal import is_ready, refuse
+from contact_blender.extension.modal import OF_ITS_OWN, is_ready, refuse
 
 MODES = ("OBJECT", "POSE")
 PIE_CHORD = {"type": "J", "value": "PRESS", "shift": True, "alt": True}
@@ -34,14 +34,6 @@ ICONS = {
     "axis": "ops.gpencil.draw.line", "weigh": "ops.gpencil.radius", "joint": "ops.pose.push",
     "measure": "ops.view3d.ruler",
 }  # fmt: skip
-OF_ITS_OWN = (
-    "pose.solve",
-    "pose.settle",
-    "pose.slide",
-    "pose.suggest",
-    "film.solve",
-    "film.window",
-)  # run beside the window
 PIE = (
     "tool.paint",
     "tool.transfer",
