@@ -152,11 +152,20 @@ class Walk:
         self.bpy.ops.object.mode_set(mode="OBJECT")
 
     def reload(self) -> None:
+        path, before = self.saved()
+        self.bpy.ops.wm.open_mainfile(filepath=path)
+        self.reopened(before)
+
+    def saved(self) -> tuple[str, Any]:
+        """Save the scene: (path, its state), to be opened again."""
         scene = self.bpy.context.scene
         scene.frame_set(scene.frame_current)  # opening does so: a pose that is not keyed on animated bones is lost
         path, before = str(self.folder / "shot.blend"), self.state()
         self.bpy.ops.wm.save_as_mainfile(filepath=path)
-        self.bpy.ops.wm.open_mainfile(filepath=path)
+        return path, before
+
+    def reopened(self, before: Any) -> None:
+        """The file was opened: the scene is what it was, and nothing can be undone."""
         self.bpy.ops.ed.undo_push(message="Original")
         if self.shared.is_stored():
             self.bpy.ops.contact.begin()
