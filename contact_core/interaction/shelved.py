@@ -22,17 +22,17 @@ APPLY, SAVE = "Apply", "Save the grasp"
 def apply_saved(interaction: Interaction, library: Library, name: str) -> None:
     """Begin to put the grasp NAME, or NAME@VERSION, on the selected hand and object, or the only ones.
 
-    What comes is proposed as suggestions are: Enter accepts, Escape refuses. Raises CommandRejected where it is not
-    clear which are meant, FileRefused for a grasp that cannot be read.
+    The best of as many ways as Suggest looks for is proposed, as suggestions are: Enter accepts, Escape refuses.
+    Raises CommandRejected where it is not clear which are meant, FileRefused for a grasp that cannot be read.
     """
     from contact_core.library.applying import apply
 
     proposing = interaction.proposing
     grasp, contacts = library.grasp(name), library.contacts(name)
-    scene = proposing.scene_of_those_meant()
+    scene, count = proposing.scene_of_those_meant(), interaction.settings.suggestions
 
     def work(progress: Progress) -> list[Applied]:
-        return apply(replace(scene(), prior="current"), grasp, contacts, progress=progress)
+        return apply(replace(scene(), prior="current"), grasp, contacts, count=count, progress=progress)
 
     def done(found: list[Applied]) -> None:
         proposing.take([one.suggestion for one in found])

@@ -62,6 +62,7 @@ class Recovery:
     def forget(self) -> None:
         """Everything is saved, or not wanted."""
         self.path.unlink(missing_ok=True)
+        self.failure = ""
 
     def _keep(self, session: Session, change: DocumentChanged) -> None:
         if change.kind in ("preview", "frame"):
@@ -72,6 +73,7 @@ class Recovery:
                 return
             self.path.parent.mkdir(parents=True, exist_ok=True)
             write_atomic(self.path, dump_document(session.timed_document))
+            self.failure = ""
         except (OSError, ContactError) as error:  # a full disk: the edit stands all the same
             self.failure = f"this step is not kept against a crash ({error}): save it."
             log.warning("%s", self.failure)

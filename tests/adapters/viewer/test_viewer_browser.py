@@ -227,6 +227,37 @@ def test_a_killed_server_loses_no_stroke(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_page_that_is_closed_in_a_stroke_leaves_what_was_done_before(browser: Any, tmp_path: Path) -> None:
+    """The stroke is put back, the next page goes on, a killed server too, and no log has a traceback."""
+    with serving(tmp_path, "sample:baseball") as served:
+        page = Page.opened(browser, served.address)
+        page.key("b")
+        page.drag((0.5, 0.5), (0.54, 0.53))
+        page.until_patches(1)
+        (left, top), (width, height), mouse = page.corner(), page.size(), page.page.mouse
+        mouse.move(left + 0.4 * width, top + 0.5 * height)
+        mouse.down()
+        mouse.move(left + 0.42 * width, top + 0.5 * height)
+        page.page.close()
+        second = Page.opened(browser, served.address)
+        second.until_patches(1)
+        second.key("b")
+        second.page.keyboard.down("Shift")
+        second.drag((0.45, 0.4), (0.47, 0.42))
+        second.page.keyboard.up("Shift")
+        second.until_patches(2)
+        second.page.close()
+        served.process.kill()
+        assert served.process.stderr is not None
+        log = served.process.stderr.read()
+        assert "Traceback" not in log, log
+    with serving(tmp_path, "sample:baseball") as served:
+        page = Page.opened(browser, served.address)
+        assert len(page.patches()) == 2
+        page.page.close()
+
+
+@pytest.mark.slow
 def test_a_dense_screen_is_drawn_and_picked_densely(browser: Any, served: Served) -> None:
     """At two device pixels per pixel the image has twice as many, and a click meets what is under it."""
     page = Page.opened(browser, served.address, scale=2.0)

@@ -17,6 +17,7 @@ from contact_viewer import panel
 from contact_viewer.application import Application
 from contact_viewer.film_panel import film_state
 from contact_viewer.look import THEMES
+from contact_viewer.web import quiet
 from contact_viewer.web.browser_events import key_of
 from contact_viewer.web.guard import HOST, Guard
 from contact_viewer.web.page import build, icon_of
@@ -76,6 +77,7 @@ class WebApplication:
                 return await handler(request)
             finally:
                 self._pages -= 1
+                self._lost()
                 self._tell()
 
         wslink_server.app.middlewares.append(web.middleware(count))
@@ -101,6 +103,12 @@ class WebApplication:
         self._tell(everything=True)
         if self.stream is not None:
             self.stream.wake(redraw=True)
+
+    def _lost(self) -> None:
+        """A page went away, in the middle of a drag perhaps: nobody will let go any more."""
+        self.app.interaction.cancel()
+        if self.stream is not None:
+            self.stream.let_go()
 
     async def _upload(self, request: Any) -> Any:
         from aiohttp import web
@@ -356,6 +364,7 @@ class WebApplication:
 def _new_server(guard: Guard) -> Any:
     """A trame server that knows our key, and reads no command line: that is ours."""
     os.environ["TRAME_ARGS"] = ""
+    quiet.install()
     from trame.app import get_server
 
     server = get_server(f"contact-{guard.key[:8]}", client_type="vue3")

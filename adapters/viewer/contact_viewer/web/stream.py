@@ -73,6 +73,12 @@ class Stream:
         """A new client: it wants an image."""
         self.wake(redraw=True)
 
+    def let_go(self) -> None:
+        """No button is held any more, and what was queued is not for anybody."""
+        self._events.clear()
+        self._pressed.clear()
+        self.wake(redraw=True)
+
     def video_codecs(self) -> list[dict[str, Any]]:
         """None: images are sent."""
         return []

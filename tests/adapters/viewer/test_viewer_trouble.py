@@ -1,0 +1,134 @@
+"""What goes wrong is a sentence, and nothing is lost: bad files, solves that fail, disks that are full."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("vtkmodules")
+
+from contact_core.document.schema import document_to_json
+from tests.adapters.viewer.test_viewer_application import painted, transferred
+from tests.adapters.viewer.viewer_scenes import Hand, application
+
+FILES: dict[str, tuple[bytes, str]] = {  # name: content, what the sentence says
+    "zero.glb": (b"", "damaged"),
+    "zero.obj": (b"", "it is empty"),
+    "zero.contactscene": (b"", "damaged"),
+    "zero.json": (b"", "not valid JSON"),
+    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
+    "far.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "damaged"),
+    "program.exe": (b"MZ", "no reader"),
+    "no suffix": (b"x", "no reader"),
+    "list.json": (b"[1]", "not a contact-core.document"),
+    "no-mesh.gltf": (
+        b'{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"name":"a"}]}',
+        "no triangles",
+    ),
+}
+HUGE = 9 << 30  # bytes of a file that holds none of them
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hand]:
+    """A hand and a mug with one pair of contacts."""
+    app = application(["sample:human_hand", "sample:mug"], tmp_path_factory.mktemp("state"))
+    made = Hand(app)
+    painted(made)
+    transferred(made)
+    yield made
+    app.close()
+
+
+@contextlib.contextmanager
+def full_disk(most: int) -> Iterator[None]:
+    """No file can be larger than so many bytes: writing beyond fails as on a disk that is full."""
+    resource = pytest.importorskip("resource", reason="files are bounded by POSIX systems alone")
+    before, beyond = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, beyond)
+
+
+def test_files_that_cannot_be_read_leave_everything_as_it_is(hand: Hand, tmp_path: Path) -> None:
+    app = hand.app
+    session, document = app.session, app.session.document
+    for name, (content, _) in FILES.items():
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "folder").mkdir()
+    for name in ("huge.glb", "huge.obj", "huge.json"):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(HUGE)
+    told = {name: says for name, (_, says) in FILES.items()} | {
+        "folder": "name the file to open",
+        "none.obj": "cannot be read",
+        "huge.glb": "bytes are read",
+        "huge.obj": "bytes are read",
+        "huge.json": "are refused",
+    }
+    for name, says in told.items():
+        app.attempt(lambda name=name: app.bring([str(tmp_path / name)]))
+        assert says in app.line() and Path(name).name in app.line(), app.line()
+        assert app.session is session and session.document is document
+
+
+def test_a_solve_that_cannot_be_is_a_sentence(hand: Hand) -> None:
+    app = hand.app
+    document = app.session.document
+    for surface in ("mug", "human_hand"):
+        app.lock("surface", surface)
+    hand.key("Shift+Space")  # contacts would move
+    hand.wait()
+    assert "locked" in app.refusal() or app.interaction.status.proposed
+    hand.key("Escape")
+    for surface in ("mug", "human_hand"):
+        app.lock("surface", surface)
+    assert app.session.document is document
+    app.interaction.set(held=("no such joint",))
+    hand.key("Space")
+    hand.wait()
+    hand.key("Escape")
+    app.interaction.set(held=())
+    app.do("selection.clear")
+    hand.key("Space")
+    assert "no pair yet" in app.refusal()
+    hand.key("Ctrl+Z")
+    assert document_to_json(app.session.document) == document_to_json(document)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="files are bounded by POSIX systems alone")
+def test_a_full_disk_loses_nothing(hand: Hand, tmp_path: Path) -> None:
+    """What was saved before is whole, what could not be written is told, and the document goes on."""
+    app, scene = hand.app, tmp_path / "kept.contactscene"
+    app.save(scene)
+    saved = scene.read_bytes()
+    with full_disk(1000):
+        app.rename("contact", "pad")
+        assert "not kept against a crash" in app.refusal()
+        hand.key("Ctrl+S")
+        assert "kept.contactscene" in app.line() and not app.session.history.is_clean
+        app.attempt(lambda: app.export(tmp_path / "scene.glb"))
+        assert "scene.glb" in app.line()
+    assert scene.read_bytes() == saved and not (tmp_path / "scene.glb").exists()
+    assert [each.name for each in tmp_path.iterdir()] == ["kept.contactscene"]
+    assert "pad" in app.session.document.patches
+    hand.key("Ctrl+S")
+    assert app.session.history.is_clean and scene.read_bytes() != saved and not app.refusal()
+
+
+def test_where_nothing_can_be_written_it_says_so(hand: Hand, tmp_path: Path) -> None:
+    app, document = hand.app, hand.app.session.document
+    (tmp_path / "file").write_text("no folder")
+    for path in (tmp_path / "file" / "a.contactscene", tmp_path / "none" / "a.glb", tmp_path / "file" / "a.usda"):
+        app.attempt(lambda path=path: app.write(path))
+        assert "file" in app.line() or "none" in app.line(), app.line()
+        assert not path.exists()
+    assert app.session.document is document
