@@ -12,11 +12,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused
+from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import SAMPLE, read_asset, unread
 from contact_core.plugins.registry import FORMATS, HOSTS
+from contact_core.scene.host import BoneChoosing, HostAdapter, SceneReading
 from contact_core.session import Session
 
 DOCUMENT_SUFFIX = ".json"
@@ -29,6 +30,7 @@ def open(  # noqa: A001 - as `pathlib.Path.open`: within this package the word m
     *,
     objects: Iterable[str] | None = None,
     surfaces: Mapping[str, str] | None = None,
+    bones: Mapping[str, str] | None = None,
     plugins: PluginManager | Iterable[object] = (),
     discover: bool = True,
 ) -> Session:
@@ -37,7 +39,9 @@ def open(  # noqa: A001 - as `pathlib.Path.open`: within this package the word m
 
     objects: of a scene, ids or names of those that become surfaces beside the ones that its document knows; all by
     default where it knows none. surfaces: object ids by surface, for those that cannot be told from their
-    triangles. plugins, discover: as for `Session`. Raises FileRefused.
+    triangles. bones: of a scene, which bones of a rig are posed, by the object's id or name, in the host's words
+    (Blender: "automatic", "deform", "controls", "collection:NAME"). plugins, discover: as for `Session`. Raises
+    FileRefused, and InvalidInput for bones that cannot be chosen.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -47,7 +51,9 @@ def open(  # noqa: A001 - as `pathlib.Path.open`: within this package the word m
     hosts = manager.offers(HOSTS)
     for host in hosts.values():
         if suffix in host.suffixes:
-            return Session(host=host.open(path), objects=objects, surfaces=surfaces, plugins=manager)
+            scene = host.open(path)
+            _choose_bones(scene, bones or {})
+            return Session(host=scene, objects=objects, surfaces=surfaces, plugins=manager)
     formats = [kind for kind in manager.offers(FORMATS).values() if kind.can_read]
     if str(path).startswith(SAMPLE) or any(suffix in kind.suffixes for kind in formats):
         asset = read_asset(path, manager)
@@ -55,6 +61,16 @@ def open(  # noqa: A001 - as `pathlib.Path.open`: within this package the word m
     suffixes = [*(kind.suffixes for kind in hosts.values()), *(kind.suffixes for kind in formats)]
     known = (DOCUMENT_SUFFIX, *(s for several in suffixes for s in several))
     raise FileRefused(f"nothing here opens {path.name}: {unread(path, known)}")
+
+
+def _choose_bones(scene: HostAdapter, bones: Mapping[str, str]) -> None:
+    for name, choice in bones.items():
+        if not isinstance(scene, BoneChoosing) or not isinstance(scene, SceneReading):
+            raise InvalidInput(f"the bones that are posed cannot be chosen in {scene.summary}.")
+        found = [item for item in scene.objects() if name in (item.id, item.name) and item.kind == "rig"]
+        if len(found) != 1:
+            raise InvalidInput(f"{len(found)} rigs of the scene are called {name!r}: give the id of one.")
+        scene.choose_bones(found[0].id, choice)
 
 
 def new(*, plugins: PluginManager | Iterable[object] = (), discover: bool = True, **sources: Source) -> Session:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from contact_core.rig.rig import Pose, Rig
     from contact_core.scene.binding import Binding
     from contact_core.scene.problem import Objective
+    from contact_core.scene.surfaces import SceneSurfaces
     from contact_core.solve.problem import Limits, PoseProblem
     from contact_core.solve.solver import SolveOptions
     from contact_core.solve.terms import PoseTerm
@@ -36,6 +37,7 @@ class ProposingSession(ABC):
     """Solve, settle, slide, accept, dismiss. rigs: by surface."""
 
     rigs: dict[str, Rig]
+    surfaces: SceneSurfaces
     timeline: Film
 
     @property
@@ -222,6 +224,7 @@ class ProposingSession(ABC):
         """The document as the scene has it at a frame, to work on."""
         from contact_core.proposals.draft import Draft
 
+        self.surfaces.follow_freedoms()
         document = self.binding.read(self.document, None) if frame is None else self.scene_at(frame)
         posed = {
             document.patch(end).surface

@@ -85,7 +85,7 @@ class Chart:
                 lower += 3 * [-np.inf]
                 upper += 3 * [np.inf]
                 prior_weight += 3 * [0.0]
-                locked += 3 * [False]
+                locked += list(freedom.locked_translation if freedom.locked_translation is not None else [])
         self.dof_names = tuple(names)
         self.lower, self.upper = np.array(lower, float), np.array(upper, float)
         self.prior_weight: FloatArray = np.array(prior_weight, float)

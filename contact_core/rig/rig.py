@@ -8,7 +8,7 @@ the rig's own space, in surface units; where a host places the rig in its scene 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -31,6 +31,7 @@ class JointFreedom:
     exponential map of a rotation vector in the frame (ball). The dofs of a joint are its rotation dofs,
     then three translations (in the rest frame of the joint) when `translates`.
 
+    locked_translation: (3,) translations that a solve never moves.
     lower, upper: (r,) offsets from rest, radians; -inf/inf where free. Translations have no limits.
     follows, ratio: a hinge that is coupled to another (a robot's mimic joint) turns by `ratio` times as much from
     rest as the hinge `follows`; it has no dof that a solve may choose, and its limits bind the other, too.
@@ -47,6 +48,7 @@ class JointFreedom:
     translates: bool = False
     follows: str | None = None
     ratio: float = 1.0
+    locked_translation: BoolArray | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in ROTATION_DOFS:
@@ -55,10 +57,12 @@ class JointFreedom:
             raise InvalidInput(f"an Euler order is a permutation of XYZ, but got {self.order!r}.")
         r = ROTATION_DOFS[self.kind]
 
-        def fill(name: str, value: Any, default: Any, dtype: Any) -> None:
-            given = np.full(r, default, dtype) if value is None else np.asarray(value, dtype)
-            if given.shape != (r,) or (dtype is float and np.isnan(given).any()):
-                raise InvalidInput(f"{name} of a {self.kind} joint needs {r} numbers, but got {given.tolist()}.")
+        def fill(name: str, value: Any, default: Any, dtype: Any, count: int = r) -> None:
+            given = np.full(count, default, dtype) if value is None else np.asarray(value, dtype)
+            if given.shape != (count,) or (dtype is float and np.isnan(given).any()):
+                raise InvalidInput(
+                    f"{name} of a {self.kind} joint needs {count} numbers, but got {given.tolist()}."
+                )
             given = given.copy()
             given.setflags(write=False)
             object.__setattr__(self, name, given)
@@ -67,12 +71,17 @@ class JointFreedom:
         fill("upper", self.upper, np.inf, float)
         fill("prior_weight", self.prior_weight, 1.0, float)
         fill("locked", self.locked, False, bool)
+        fill("locked_translation", self.locked_translation, False, bool, 3)
         object.__setattr__(self, "frame", frozen(self.frame, np.float64, (3, 3), "frame of a joint's freedom"))
         if self.follows is not None and (self.kind != "hinge" or not np.isfinite(self.ratio)):
             raise InvalidInput(
                 f"a joint that follows another is a hinge with a finite ratio, but got a {self.kind} joint and"
                 f" {self.ratio}."
             )
+
+    def is_like(self, other: JointFreedom) -> bool:
+        """Whether both let a joint move alike, number by number."""
+        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
 
 
 @dataclass(frozen=True, eq=False)

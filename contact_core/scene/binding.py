@@ -19,9 +19,17 @@ from contact_core.document.document import ContactDocument, Surface
 from contact_core.edit.commands import SetExtra
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.rig.pose_keys import PoseKeys
-from contact_core.rig.rig import Pose, Rig
+from contact_core.rig.rig import JointFreedom, Pose, Rig
 from contact_core.scene.evaluated_rig import EvaluatingHost, HostRig, evaluated_by_host
-from contact_core.scene.host import CurveWriting, HostAdapter, PoseWriting, RigReading, SceneObject, SceneReading
+from contact_core.scene.host import (
+    BoneChoosing,
+    CurveWriting,
+    HostAdapter,
+    PoseWriting,
+    RigReading,
+    SceneObject,
+    SceneReading,
+)
 
 PLACED_ALIKE = 1e-9  # world_from_surface entries that count as equal
 POSED_ALIKE = 2e-6  # of a rotation's entries, and of the rig's size: what single precision of hosts keeps
@@ -58,6 +66,11 @@ class Binding:
     def has_scene(self) -> bool:
         """Whether there is a scene to bind to."""
         return self._host is not None
+
+    @property
+    def host(self) -> HostAdapter | None:
+        """The scene, None without."""
+        return self._host
 
     @property
     def key(self) -> str:
@@ -247,6 +260,20 @@ class Binding:
             if isinstance(host, SceneReading) and isinstance(host, RigReading):
                 self._evaluated[name] = evaluated_by_host(cast(EvaluatingHost, host), found.object_id)
         return {name: rig for name in names if (rig := self._evaluated.get(name)) is not None}
+
+    def follow_freedoms(self) -> dict[str, Rig]:
+        """By surface, rigs whose locks, limits or choice of bones have changed in the scene since then."""
+        host, changed = self._host, dict[str, Rig]()
+        for name, found in tuple(self.surfaces.items()):
+            if found.rig is None or name in self.missing or not isinstance(host, BoneChoosing):
+                continue
+            now = host.freedoms(found.object_id)
+            alike = len(now) == len(found.rig.freedoms) and all(map(JointFreedom.is_like, now, found.rig.freedoms))
+            if not alike and len(now) == len(found.rig.joints):
+                changed[name] = replace(found.rig, freedoms=now)
+                self.surfaces[name] = BoundSurface(found.object_id, replace(found.asset, rig=changed[name]))
+                self._evaluated.pop(name, None)
+        return changed
 
     # --- what the scene is told -----------------------------------------------------------------------------
 

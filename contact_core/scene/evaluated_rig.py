@@ -25,6 +25,7 @@ from contact_core.solve.body import Body
 TOLERANCE = 1e-4  # of the skin's diagonal: single precision of hosts stays well below
 PROBES = 3  # bent poses that are compared
 BEND = 0.5  # radians
+SHIFT = 0.05  # of the skin's diagonal
 _STEP = 1e-3  # radians, or of the rig's size: well above what single precision makes of a vertex
 
 
@@ -98,14 +99,15 @@ def check_skin(host: RigReading, object_id: str) -> SkinCheck:
 
 
 def probes(rig: Rig) -> tuple[Pose, ...]:
-    """Poses that bend every free joint a little, within its limits; the same at each call."""
+    """Poses that bend and shift every free joint a little, within its limits; the same at each call."""
     chart, random = Chart(rig), np.random.default_rng(1)
     start, leftover = chart.theta_of(Pose.rest(rig))
-    turns = ~chart.locked & ~chart.is_translation
+    shift = SHIFT * (rig.surface.bounding_box_diagonal or 1.0)
+    reach = np.where(chart.is_translation, shift, BEND)
     poses = []
     for _ in range(PROBES):
-        theta = start + np.where(turns, random.uniform(-BEND, BEND, chart.size), 0.0)
-        theta = np.where(turns, np.clip(theta, chart.lower, chart.upper), start)
+        theta = start + reach * random.uniform(-1.0, 1.0, chart.size)
+        theta = np.where(chart.locked, start, np.clip(theta, chart.lower, chart.upper))
         poses.append(Pose(rig.joints, chart.local(theta, leftover)))
     return tuple(poses)
 

@@ -27,7 +27,7 @@ from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.progress import Progress
 from contact_core.rig.pose_keys import PoseKeys
-from contact_core.rig.rig import Pose
+from contact_core.rig.rig import JointFreedom, Pose
 from contact_core.scene.picture import Picture
 
 
@@ -144,6 +144,26 @@ class RigReading(HostAdapter, Protocol):
     @abstractmethod
     def skin_points(self, object_id: str, pose: Pose) -> FloatArray:
         """(n, 3) the host's OWN evaluation of the skin in that pose, in rig space; the scene is left as it was."""
+        ...
+
+
+@runtime_checkable
+class BoneChoosing(HostAdapter, Protocol):
+    """Rigs with more bones than an animator poses: which of them a solve may move is the artist's choice."""
+
+    @abstractmethod
+    def bones_of(self, object_id: str) -> str:
+        """What was chosen for a rig, in the host's words."""
+        ...
+
+    @abstractmethod
+    def choose_bones(self, object_id: str, choice: str) -> None:
+        """Choose, for all that hangs on the same bones; one undo step. Raises InvalidInput for no known choice."""
+        ...
+
+    @abstractmethod
+    def freedoms(self, object_id: str) -> tuple[JointFreedom, ...]:
+        """What a solve may do with each joint as the scene has it now: choice, locks and limits."""
         ...
 
 

@@ -23,7 +23,7 @@ from contact_core.scene.host import DocumentStamp, SceneSpace, StoredDocument
 FORMAT = "contact-core.memory-scene"
 FORMAT_VERSION = 2  # 1 held the document in one piece
 MAX_BYTES = 1 << 32  # of arrays in one file: beyond any scene, below a zip bomb
-_FREEDOM_ARRAYS = ("frame", "lower", "upper", "prior_weight", "locked")
+_FREEDOM_ARRAYS = ("frame", "lower", "upper", "prior_weight", "locked", "locked_translation")
 _RIG_ARRAYS = (
     "parents",
     "rest_local",
@@ -214,7 +214,8 @@ def _object_from_json(data: dict[str, Any], arrays: dict[str, Any]) -> MemoryObj
                 kind=kind,
                 order=order,
                 translates=translates,
-                **{name: arrays[key] for name, key in zip(_FREEDOM_ARRAYS, keys, strict=True)},
+                # the last is not in files of earlier releases
+                **{name: arrays[key] for name, key in zip(_FREEDOM_ARRAYS, keys, strict=False)},
             )
             for kind, order, translates, *keys in data["freedoms"]
         )

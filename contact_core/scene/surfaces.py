@@ -9,7 +9,9 @@ from contact_core.edit.command import Macro
 from contact_core.edit.commands import RenameSurface, SetExtra
 from contact_core.edit.editor import Editor
 from contact_core.edit.verbs import Surfaces
+from contact_core.errors import InvalidInput
 from contact_core.scene.binding import Binding
+from contact_core.scene.host import BoneChoosing
 
 
 class BoundEditor(Editor, Protocol):
@@ -44,6 +46,22 @@ class SceneSurfaces(Surfaces):
             up_axis=asset.up_axis,
             world_from_surface=binding.placement(found.object_id),
         )
+
+    def choose_bones(self, surface: str, choice: str) -> None:
+        """Say which bones of the rig behind a surface a solve may pose, in the host's words; one step of its undo.
+
+        Raises InvalidInput where the host has no such choice.
+        """
+        binding = self._bound.binding
+        found, host = binding.surfaces.get(surface), binding.host
+        if found is None or found.rig is None or not isinstance(host, BoneChoosing):
+            raise InvalidInput(f"behind {surface!r} is no rig of a scene of which bones can be chosen.")
+        host.choose_bones(found.object_id, choice)
+        self.follow_freedoms()
+
+    def follow_freedoms(self) -> None:
+        """Take over what has changed in the scene of what rigs may do: locks, limits, the choice of bones."""
+        self._editor.rigs.update(self._bound.binding.follow_freedoms())
 
     def rename(self, surface: str, name: str) -> None:
         """Give a surface another name, everywhere; the object behind it stays behind it."""

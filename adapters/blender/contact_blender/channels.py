@@ -19,6 +19,7 @@ from contact_core.errors import InvalidInput
 
 ROTATION_CHANNEL = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 CHANNELS = ("location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler", "scale")
+_ALIKE = 2e-6  # of a basis' entries, and of the length of its bone
 _NOTHING = 1e-6  # a change of a scale or of a length (relative) that single precision makes by itself
 
 
@@ -63,6 +64,12 @@ def write_basis(pose_bone: Any, basis: FloatArray) -> tuple[str, ...]:
         pose_bone.scale = scale.tolist()
         written.append("scale")
     return tuple(written)
+
+
+def is_there(pose_bone: Any, basis: FloatArray) -> bool:
+    """Whether a bone's channels say this basis (4, 4) already, to single precision."""
+    size = np.where(np.arange(4) == 3, max(1.0, float(pose_bone.bone.length)), 1.0)  # (4,) columns
+    return bool((np.abs(basis - np.array(pose_bone.matrix_basis)) <= _ALIKE * size).all())
 
 
 def snapshot(pose_bone: Any) -> Callable[[Any], None]:

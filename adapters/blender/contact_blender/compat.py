@@ -21,6 +21,20 @@ def version() -> tuple[int, int, int]:
     return int(major), int(minor), int(patch)
 
 
+def is_shown(pose_bone: Any) -> bool:
+    """Whether an artist sees a bone and can select it. Hiding moved from bones to pose bones in 5.0."""
+    bone = pose_bone.bone
+    hidden = pose_bone.hide if hasattr(pose_bone, "hide") else bone.hide
+    collections = bone.collections
+    seen = not len(collections) or any(each.is_visible_effectively for each in collections)
+    return bool(seen and not hidden and not bone.hide_select)
+
+
+def drivers(owner: Any) -> tuple[Any, ...]:
+    """The drivers of an ID, for immediate use; alike on every version."""
+    return tuple(owner.animation_data.drivers) if owner.animation_data else ()
+
+
 def fcurves(owner: Any) -> Iterable[Any]:
     """The animation curves of an ID (object): of its action's own slot from 4.4 on, of the action before.
 

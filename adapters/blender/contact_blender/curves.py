@@ -7,7 +7,7 @@ Euler and axis-angle channels take another way between the same keys: they get k
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from contact_blender import compat, keys
-from contact_blender.channels import near_angles, rotation_channel
+from contact_blender.channels import is_there, near_angles, rotation_channel
 from contact_blender.rig import UNMOVED, read_skeleton
 from contact_core.arrays import BoolArray, FloatArray
 from contact_core.errors import InvalidInput
@@ -41,11 +41,12 @@ class BoneCurves:
     interpolation: int = BEZIER
 
 
-def write(armature: Any, rig: Rig, pose_keys: PoseKeys, stretch: FloatArray) -> None:
+def write(armature: Any, rig: Rig, pose_keys: PoseKeys, stretch: FloatArray, posed: Collection[str]) -> None:
     """Key the bones that the keys name by curves through them, in place of their keys from the first to the last.
 
-    rig: what the keys are of, whose space is the armature's after a stretch (3, 3). Keys outside, other bones and
-    other channels stay as they are. Raises InvalidInput for unknown bones, scale that no channel holds, and shifts
+    rig: what the keys are of, whose space is the armature's after a stretch (3, 3). posed: the bones that a solve
+    may pose; another is keyed only where it is to be elsewhere than it is. Keys outside, other bones and other
+    channels stay as they are. Raises InvalidInput for unknown bones, scale that no channel holds, and shifts
     of connected bones, before anything is written.
     """
     motion = _Motion(rig, pose_keys, stretch)
@@ -55,12 +56,19 @@ def write(armature: Any, rig: Rig, pose_keys: PoseKeys, stretch: FloatArray) -> 
     unknown = [name for name in named if name not in bases]
     if unknown:
         raise InvalidInput(f"{armature.name} has no bone {unknown[0]!r}; are these keys of another rig?")
-    found = {name: _curves_of(armature.pose.bones[name], bases[name], motion) for name in named}
+    bones = armature.pose.bones
+    moved = [n for n in named if n in posed or _moves(bones[n], bases[n] @ motion.local(n, motion.frames))]
+    found = {name: _curves_of(bones[name], bases[name], motion) for name in moved}
     for name, curves in found.items():
         for curve in curves:
             _put(armature, name, curve)
     keys.show_animation(armature, {name: tuple(c.channel for c in curves) for name, curves in found.items()})
     armature.update_tag(refresh={"OBJECT"})
+
+
+def _moves(pose_bone: Any, seen: FloatArray) -> bool:
+    """Whether a bone is elsewhere now than in any of the bases (k, 4, 4)."""
+    return not all(is_there(pose_bone, basis) for basis in seen)
 
 
 class _Motion:
@@ -168,13 +176,16 @@ def _off(mode: str, curve: BoneCurves, frames: FloatArray, wanted: FloatArray) -
 
 
 def _put(armature: Any, bone: str, curve: BoneCurves) -> None:
-    """Put the keys of a channel into its curves, which are made where there are none."""
+    """Put the keys of a channel into its curves, which are made where there are none and no driver is."""
     pose_bone = armature.pose.bones[bone]
     path = pose_bone.path_from_id(curve.channel)
     known = {c.array_index for c in compat.fcurves(armature) if c.data_path == path}
-    if len(known) < curve.values.shape[1]:
+    known |= {driver.array_index for driver in compat.drivers(armature) if driver.data_path == path}
+    new = set(range(curve.values.shape[1])) - known
+    if new:
         getattr(pose_bone, curve.channel)[:] = curve.values[0].tolist()
-        pose_bone.keyframe_insert(curve.channel, frame=float(curve.frames[0]), group=bone)
+    for index in new:
+        pose_bone.keyframe_insert(curve.channel, index=index, frame=float(curve.frames[0]), group=bone)
     for found in [c for c in compat.fcurves(armature) if c.data_path == path]:
         index = int(found.array_index)
         values, slopes = curve.values[:, index], curve.slopes[:, index]

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from contact_blender import mesh as meshes
-from contact_blender.channels import snapshot, write_basis
+from contact_blender.channels import is_there, snapshot, write_basis
 from contact_blender.rig import armature_from_mesh
 from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
@@ -43,11 +43,15 @@ def graph_at(frame: float | None, *scene_objects: Any) -> Iterator[Any]:
 
 @contextmanager
 def posed(armature: Any, bases: Mapping[str, FloatArray]) -> Iterator[None]:
-    """The armature with its bones' channels set to bases (4, 4), and afterwards as it was, bit for bit."""
+    """The armature with its bones' channels set to bases (4, 4), and afterwards as it was, bit for bit.
+
+    Bones that are there already are left alone: of a control rig that is nearly all of them.
+    """
     bones = armature.pose.bones
-    before = {name: snapshot(bones[name]) for name in bases}
+    moved = {name: basis for name, basis in bases.items() if not is_there(bones[name], basis)}
+    before = {name: snapshot(bones[name]) for name in moved}
     try:
-        for name, basis in bases.items():
+        for name, basis in moved.items():
             write_basis(bones[name], basis)
         yield
     finally:

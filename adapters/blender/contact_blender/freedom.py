@@ -14,17 +14,21 @@ from typing import Any
 
 import numpy as np
 
+from contact_core.arrays import BoolArray, FloatArray
 from contact_core.rig.rig import JointFreedom
 
 AXES = "XYZ"
 _KEPT = "contact_freedom"
 
 
-def freedom_of(pose_bone: Any, translates: bool) -> JointFreedom:
-    """The freedom of a pose bone: what `write_freedom` gave it, or what the artist has set since or before."""
-    native = _native(pose_bone, translates)
+def freedom_of(pose_bone: Any, translates: bool, driven: BoolArray | None = None) -> JointFreedom:
+    """The freedom of a pose bone: what `write_freedom` gave it, or what the artist has set since or before.
+
+    driven: (6,) the turns about and shifts along x, y, z that drivers set, which are locked.
+    """
+    native = _native(pose_bone, translates, np.zeros(6, bool) if driven is None else driven)
     kept = pose_bone.get(_KEPT)
-    if isinstance(kept, str):
+    if isinstance(kept, str) and (driven is None or not driven.any()):
         with contextlib.suppress(
             ValueError, KeyError, TypeError
         ):  # somebody else's or damaged: Blender's view counts
@@ -34,22 +38,27 @@ def freedom_of(pose_bone: Any, translates: bool) -> JointFreedom:
     return native
 
 
-def _native(pose_bone: Any, translates: bool) -> JointFreedom:
+def _native(pose_bone: Any, translates: bool, driven: BoolArray) -> JointFreedom:
     """Blender's own view of a bone: a ball, or Euler angles as soon as a lock or a limit speaks of single axes.
 
     Limits are those of an enabled Limit Rotation constraint in local space; on the axes that it leaves free,
-    the bone's IK limits. Locked: transform locks and IK locks. All angles are offsets from rest, radians.
+    the bone's IK limits. Locked: transform locks and IK locks. A bone that is stiff for IK is held to its rest the
+    more. All angles are offsets from rest, radians.
     """
     lower, upper = limits_of(pose_bone)
-    locked = locks_of(pose_bone)
+    locked, prior = locks_of(pose_bone) | driven[:3], 1.0 / (1.0 - stiffness_of(pose_bone))
+    still = np.array(pose_bone.lock_location, bool) | driven[3:] if translates else np.zeros(3, bool)
     limited = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
     if not limited and (locked.all() or not locked.any()):
-        return JointFreedom("ball", locked=locked, translates=translates)
+        return JointFreedom(
+            "ball", locked=locked, prior_weight=prior, translates=translates, locked_translation=still
+        )
     order = euler_order(pose_bone)[::-1]
     places = [AXES.index(axis) for axis in order]
     return JointFreedom(
-        "euler", order=order, lower=lower[places], upper=upper[places], locked=locked[places], translates=translates
-    )
+        "euler", order=order, lower=lower[places], upper=upper[places], locked=locked[places],
+        prior_weight=prior[places], translates=translates, locked_translation=still,
+    )  # fmt: skip
 
 
 def euler_order(pose_bone: Any) -> str:
@@ -93,6 +102,11 @@ def locks_of(pose_bone: Any) -> Any:
     return np.array(pose_bone.lock_rotation, bool) | np.array(ik, bool)
 
 
+def stiffness_of(pose_bone: Any) -> FloatArray:
+    """(3,) how stiff the bone is for IK about x, y, z: 0 .. 0.99, as Blender has it."""
+    return np.array([min(getattr(pose_bone, f"ik_stiffness_{axis}"), 0.99) for axis in AXES.lower()])
+
+
 def write_freedom(pose_bone: Any, freedom: JointFreedom) -> None:
     """Give a new bone this freedom: by Blender's own means as far as they reach, and exactly beside them.
 
@@ -115,13 +129,14 @@ def write_freedom(pose_bone: Any, freedom: JointFreedom) -> None:
     pose_bone.lock_rotation = tuple(bool(lock) for lock in locks)
     _add_limits(pose_bone, lower, upper)
     if pose_bone.parent is None:
-        pose_bone.lock_location = 3 * (not freedom.translates,)
+        held = np.asarray(freedom.locked_translation) | (not freedom.translates)
+        pose_bone.lock_location = tuple(bool(lock) for lock in held)
     pose_bone[_KEPT] = json.dumps([to_json(freedom), _seen(pose_bone)])
 
 
 def _seen(pose_bone: Any) -> list[Any]:
     """What an artist can change of a bone's freedom, as plain values."""
-    return [to_json(_native(pose_bone, False)), list(pose_bone.lock_location)]
+    return [to_json(_native(pose_bone, False, np.zeros(6, bool))), list(pose_bone.lock_location)]
 
 
 def _add_limits(pose_bone: Any, lower: Any, upper: Any) -> None:
@@ -149,6 +164,7 @@ def to_json(freedom: JointFreedom) -> dict[str, Any]:
         "lower": plain(freedom.lower), "upper": plain(freedom.upper), "prior": plain(freedom.prior_weight),
         "locked": [bool(lock) for lock in np.asarray(freedom.locked)], "translates": freedom.translates,
         "follows": freedom.follows, "ratio": freedom.ratio,
+        "locked_translation": [bool(lock) for lock in np.asarray(freedom.locked_translation)],
     }  # fmt: skip
 
 
@@ -162,4 +178,5 @@ def from_json(values: dict[str, Any]) -> JointFreedom:
         values["kind"], np.array(values["frame"]), values["order"], np.array(bounds("lower", -np.inf)),
         np.array(bounds("upper", np.inf)), np.array(bounds("prior", 1.0)), np.array(values["locked"], bool),
         bool(values["translates"]), values.get("follows"), float(values.get("ratio", 1.0)),
+        np.array(values.get("locked_translation", (False, False, False)), bool),
     )  # fmt: skip

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from contact_blender import compat, curves, evaluation, exporter, fidelity, keys, poses, selection, storage
+from contact_blender import bones as bone_choice
+from contact_blender import choices, compat, curves, evaluation, exporter, fidelity, keys, poses, selection, storage
 from contact_blender import mesh as meshes
 from contact_blender import rig as rigs
 from contact_blender.compat import bpy
@@ -24,8 +25,9 @@ from contact_core.errors import Cancelled, FileRefused, InvalidInput
 from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.pose_keys import PoseKeys
-from contact_core.rig.rig import Pose
+from contact_core.rig.rig import JointFreedom, Pose
 from contact_core.scene.host import (
+    BoneChoosing,
     CurveWriting,
     Display,
     DocumentStamp,
@@ -62,6 +64,7 @@ class BlenderHost(
     SceneReading,
     SceneWriting,
     RigReading,
+    BoneChoosing,
     CurveWriting,
     DocumentStorage,
     Undo,
@@ -73,25 +76,26 @@ class BlenderHost(
     """The scene of Blender's window, or of the bpy module. Ids are the names under which objects were first seen.
 
     path: a .blend to open first; None: the scene that is open. A process is one Blender, so opening a file
-    replaces what was open. Raises FileRefused.
+    replaces what was open. bones: which bones are posed where nobody chose (`choose_bones`). Raises FileRefused.
     """
 
     name = "blender"
     summary = "the scene that is open in Blender"
     suffixes = (".blend",)
 
-    def __init__(self, path: Path | str | None = None) -> None:
+    def __init__(self, path: Path | str | None = None, *, bones: str = bone_choice.AUTOMATIC) -> None:
         if compat.version() < compat.OLDEST:
             raise InvalidInput(
                 f"Blender 4.2 or newer is needed, but this is {'.'.join(map(str, compat.version()))}."
             )
         if path is not None:
-            _open_file(Path(path))
+            storage.open_file(Path(path))
         self._ids = ObjectIds()
         self._undo = UndoBridge()
         self._overlay: Overlay | None = None
         self._cancel_asked = False
         self._shows_progress = False
+        self._bones = bones
         self._known: dict[str, _KnownRig] = {}
         self._scene_uid = int(bpy.context.scene.session_uid)
         self._lifetime = SceneEnd()
@@ -152,14 +156,15 @@ class BlenderHost(
 
     def read_rig(self, object_id: str) -> Asset:
         scene_object, armature, placement = self._rigged(object_id)
-        reading = rigs.read_rig(scene_object, armature, meshes.current_depsgraph(), str(scene_object.name))
+        name, choice = str(scene_object.name), self._chosen(armature)
+        reading = rigs.read_rig(scene_object, armature, meshes.current_depsgraph(), name, choice)
         self._known[object_id] = _KnownRig(reading.kept, len(reading.vertices), rigs.UNMOVED in reading.rig.joints)
         rig = stretch_rig(reading.rig, placement, self.space())
         beyond = fidelity.beyond_linear_skinning(scene_object, armature)
         difference = fidelity.largest_difference(scene_object, armature, reading)
         exact = not beyond and difference is not None and difference <= fidelity.TOLERANCE
         return Asset(
-            name=str(scene_object.name),
+            name=name,
             mesh=rig.surface,
             rig=rig,
             source_vertices=reading.vertices,
@@ -176,6 +181,24 @@ class BlenderHost(
         pose = poses.read_pose(armature, frame, self._known_rig(object_id).unmoved)
         return stretch_pose(pose, placement.surface_from_local)
 
+    def bones_of(self, object_id: str) -> str:
+        return self._chosen(self._armature(object_id))
+
+    def bone_choices(self, object_id: str) -> list[tuple[str, str]]:
+        """(choice, label) of what `choose_bones` takes for a rig."""
+        return bone_choice.listed(self._armature(object_id))
+
+    def choose_bones(self, object_id: str, choice: str) -> None:
+        armature = self._armature(object_id)
+        bone_choice.check_choice(armature, choice)
+        with self.step("Choose bones"):
+            take_back = choices.write(self._scene, armature, choice)
+            self._undo.wrote(lambda: take_back(self._scene))
+
+    def freedoms(self, object_id: str) -> tuple[JointFreedom, ...]:
+        scene_object, armature, _ = self._rigged(object_id)
+        return rigs.freedoms(scene_object, armature, self._chosen(armature), self._known_rig(object_id).unmoved)
+
     def skin_points(self, object_id: str, pose: Pose) -> FloatArray:
         scene_object, armature, placement = self._rigged(object_id)
         local = unstretch_pose(pose, placement.surface_from_local)
@@ -187,25 +210,25 @@ class BlenderHost(
 
     def write_pose(self, object_id: str, pose: Pose, frame: float | None = None) -> None:
         check_frame(frame)
-        _, armature, placement = self._rigged(object_id)
-        _check_local(armature)
+        scene_object, armature, placement = self._rigged(object_id)
+        poses.check_local(armature)
         local = unstretch_pose(pose, placement.surface_from_local)
         armature_id = self._ids.id_of(armature)
         with self.step("Pose"):
             put_back = poses.remember(armature, pose.joints, frame)
             self._undo.wrote(lambda: put_back(self._ids.resolve(armature_id)))
-            poses.write_pose(armature, local, frame)
+            poses.write_pose(armature, local, frame, self._posed(scene_object, armature))
 
     def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
-        _, armature, placement = self._rigged(object_id)
-        _check_local(armature)
-        rig = self.read_rig(object_id).rig
+        scene_object, armature, placement = self._rigged(object_id)
+        poses.check_local(armature)
+        rig, posed = self.read_rig(object_id).rig, self._posed(scene_object, armature)
         assert rig is not None
         armature_id, joints = self._ids.id_of(armature), pose_keys.poses[0].joints
         with self.step("Curves"):
             put_back = poses.remember(armature, joints, pose_keys.frames[0])
             self._undo.wrote(lambda: put_back(self._ids.resolve(armature_id)))
-            curves.write(armature, rig, pose_keys, placement.surface_from_local)
+            curves.write(armature, rig, pose_keys, placement.surface_from_local, posed)
 
     def preview_pose(self, object_id: str, pose: Pose) -> None:
         """Show a pose on the bones while something is dragged or proposed: no step, no key. `end_previews` puts the
@@ -362,11 +385,23 @@ class BlenderHost(
 
     def _rigged(self, object_id: str) -> tuple[Any, Any, PolarDecomposition]:
         """Mesh object, armature object, placement of the armature."""
-        scene_object = self._mesh_object(object_id)
-        armature = rigs.armature_of(scene_object)
+        scene_object, armature = self._mesh_object(object_id), self._armature(object_id)
+        return scene_object, armature, self._placement(armature)
+
+    def _armature(self, object_id: str) -> Any:
+        """Found without an evaluation, so that a panel may ask while it draws."""
+        armature = rigs.armature_of(self._ids.resolve(object_id))
         if armature is None:
             raise InvalidInput(f"{object_id} is a surface and has no rig: no armature deforms it.")
-        return scene_object, armature, self._placement(armature)
+        return armature
+
+    def _chosen(self, armature: Any) -> str:
+        """Which bones of an armature are posed."""
+        found = choices.read(self._scene, armature)
+        return self._bones if found is None else found
+
+    def _posed(self, scene_object: Any, armature: Any) -> frozenset[str]:
+        return bone_choice.posed_bones(scene_object, armature, self._chosen(armature))
 
     def _known_rig(self, object_id: str) -> _KnownRig:
         """What the last reading of the rig found; read again when the mesh has another number of vertices."""
@@ -378,22 +413,3 @@ class BlenderHost(
     def _placement(self, scene_object: Any, frame: float | None = None) -> PolarDecomposition:
         with evaluation.graph_at(frame, scene_object) as depsgraph:
             return split_world_from_local(np.array(scene_object.evaluated_get(depsgraph).matrix_world, float))
-
-
-def _check_local(armature: Any) -> None:
-    """Raises InvalidInput for one that another file holds."""
-    if armature.library is not None:
-        raise InvalidInput(
-            f"{armature.name} is linked from {armature.library.filepath}, so its pose would not be saved: make"
-            " a library override of it and pose that."
-        )
-
-
-def _open_file(source: Path) -> None:
-    """Let this process's Blender open a file. Raises FileRefused."""
-    if not source.is_file():
-        raise FileRefused(f"there is no file {source}.")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(source.resolve()), load_ui=False)
-    except RuntimeError as error:
-        raise FileRefused(f"Blender cannot open {source}: {str(error).strip()}") from error

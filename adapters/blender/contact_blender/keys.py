@@ -8,7 +8,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from contact_blender import compat
+from contact_blender import compat, keying_set
+from contact_blender.keying_set import ChannelKey
+from contact_core.errors import InvalidInput
 
 Written = Mapping[str, tuple[str, ...]]  # channels that were set, by bone
 _FIELDS = {  # of a key: numbers each, and their kind
@@ -30,14 +32,59 @@ def key_frame(frame: float | None) -> float | None:
 
 
 def insert(armature: Any, written: Written, frame: float, *, by_auto_key: bool) -> None:
-    """Key the channels; auto-key's own "only available" preference holds where auto-key is what keys."""
-    only_available = by_auto_key and bpy.context.preferences.edit.use_keyframe_insert_available
-    there = {curve.data_path for curve in compat.fcurves(armature)} if only_available else set()
-    for name, channels in written.items():
-        pose_bone = armature.pose.bones[name]
-        for channel in channels:
-            if not only_available or pose_bone.path_from_id(channel) in there:
-                pose_bone.keyframe_insert(channel, frame=frame, group=name)
+    """Key the channels that were written, or of those bones what the user's active keying set names.
+
+    Auto-key's own preferences ("only available", "only active keying set") hold where auto-key is what keys. What a
+    driver sets is left out. Raises InvalidInput where the keying set has nothing of these bones, and where the
+    action is another file's.
+    """
+    _check_action(armature)
+    chosen = keying_set.active(by_auto_key=by_auto_key)
+    found = _written(armature, written) if chosen is None else _named(armature, written, chosen)
+    if chosen is None and by_auto_key and bpy.context.preferences.edit.use_keyframe_insert_available:
+        there = {curve.data_path for curve in compat.fcurves(armature)}
+        found = [each for each in found if each.path in there]
+    driven = {(each.data_path, each.array_index) for each in compat.drivers(armature)}
+    for each in found:
+        count = _count(armature, each.path)
+        free = [place for place in range(count) if (each.path, place) not in driven]
+        places = [-1] if each.index < 0 and len(free) == count else free if each.index < 0 else [each.index]
+        for place in places:
+            if (each.path, max(place, 0)) not in driven:
+                armature.keyframe_insert(each.path, index=place, frame=frame, group=each.group)
+
+
+def _written(armature: Any, written: Written) -> list[ChannelKey]:
+    """All channels that a pose has set."""
+    bones = armature.pose.bones
+    return [ChannelKey(bones[n].path_from_id(c), -1, n) for n, channels in written.items() for c in channels]
+
+
+def _named(armature: Any, written: Written, chosen: Any) -> list[ChannelKey]:
+    """What a keying set names of the bones that were written. Raises InvalidInput where that is nothing."""
+    found = [each for name in written for each in keying_set.channel_keys(chosen, armature.pose.bones[name])]
+    if written and not found:
+        raise InvalidInput(
+            f"the active keying set {chosen.bl_label!r} has no channel of the posed bones"
+            f" ({', '.join(list(written)[:3])} ...), so the pose would be lost at the next frame: choose another"
+            " keying set, or none."
+        )
+    return found
+
+
+def _count(armature: Any, path: str) -> int:
+    """How many numbers a path has."""
+    value = armature.path_resolve(path)
+    return len(value) if hasattr(value, "__len__") and not isinstance(value, str) else 1
+
+
+def _check_action(armature: Any) -> None:
+    action = armature.animation_data.action if armature.animation_data else None
+    if action is not None and action.library is not None:
+        raise InvalidInput(
+            f"the action {action.name!r} of {armature.name} is linked from {action.library.filepath}, so no key can"
+            " be set in it: give the armature an action of this file, or make this one local."
+        )
 
 
 def show_animation(armature: Any, written: Written) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 import bpy
 import numpy as np
 
 from contact_blender import keys
-from contact_blender.channels import read_basis, snapshot, write_basis
+from contact_blender.channels import is_there, read_basis, snapshot, write_basis
 from contact_blender.evaluation import graph_at
 from contact_blender.rig import UNMOVED, Skeleton, read_skeleton
 from contact_core.arrays import FloatArray
@@ -46,8 +46,10 @@ def bases_of(skeleton: Skeleton, pose: Pose, armature_name: str) -> dict[str, Fl
     }
 
 
-def write_pose(armature: Any, pose: Pose, frame: float | None) -> None:
+def write_pose(armature: Any, pose: Pose, frame: float | None, posed: Collection[str]) -> None:
     """Set the bones that a pose in armature space names, and key them at a frame.
+
+    posed: the bones that a solve may pose; another is set, and keyed, only where it is to be elsewhere than it is.
 
     For None there is a key only where Blender's auto-key is on, at the current frame, as for an edit by hand. A key
     at another frame than the current one leaves what is seen now to the animation. Raises InvalidInput, with the
@@ -58,7 +60,8 @@ def write_pose(armature: Any, pose: Pose, frame: float | None) -> None:
     written: dict[str, tuple[str, ...]] = {}
     try:
         for name, basis in bases_of(read_skeleton(armature), pose, armature.name).items():
-            written[name] = write_basis(bones[name], basis)
+            if name in posed or not is_there(bones[name], basis):
+                written[name] = write_basis(bones[name], basis)
     except InvalidInput:
         for name, restore in before.items():
             restore(bones[name])
@@ -69,6 +72,15 @@ def write_pose(armature: Any, pose: Pose, frame: float | None) -> None:
     if at is not None and at != bpy.context.scene.frame_current_final:
         keys.show_animation(armature, written)
     armature.update_tag(refresh={"OBJECT"})
+
+
+def check_local(armature: Any) -> None:
+    """Raises InvalidInput for one that another file holds."""
+    if armature.library is not None:
+        raise InvalidInput(
+            f"{armature.name} is linked from {armature.library.filepath}, so its pose would not be saved: make"
+            " a library override of it and pose that."
+        )
 
 
 def remember(armature: Any, bones: Iterable[str], frame: float | None) -> Callable[[Any], None]:

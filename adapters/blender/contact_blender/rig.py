@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from contact_blender import bones
 from contact_blender import mesh as meshes
-from contact_blender.freedom import freedom_of
 from contact_blender.weights import group_weights, influences
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
@@ -91,8 +91,11 @@ def read_skeleton(armature: Any) -> Skeleton:
     return Skeleton(tuple(bone.name for bone in bones), parents, local, rest)
 
 
-def read_rig(scene_object: Any, armature: Any, depsgraph: Any, name: str) -> RigReading:
-    """The analytic rig of a skinned mesh object, with notes on what was normalised, merged or added."""
+def read_rig(scene_object: Any, armature: Any, depsgraph: Any, name: str, choice: str) -> RigReading:
+    """The analytic rig of a skinned mesh object, with notes on what was normalised, merged or added.
+
+    choice: which bones are posed, see `bones`.
+    """
     skeleton = read_skeleton(armature)
     with meshes.cage(scene_object) as cage:
         local = meshes.read_polygons(cage)
@@ -108,22 +111,26 @@ def read_rig(scene_object: Any, armature: Any, depsgraph: Any, name: str) -> Rig
     faces, cut, cut_notes = triangulate(sound.sizes, sound.indices, points[kept])
     if mirrored:
         faces = faces[:, ::-1]
-    freedoms = [freedom_of(armature.pose.bones[b], _translates(armature, b)) for b in skeleton.joints]
     names, parents, rest = skeleton.joints, skeleton.parents, skeleton.rest_local
     bind = forward_kinematics(parents, skeleton.edit_local)
     if (joints == len(names)).any():
         names, parents = (*names, UNMOVED), np.append(parents, -1)
         rest, bind = np.concatenate([rest, np.eye(4)[None]]), np.concatenate([bind, np.eye(4)[None]])
-        freedoms.append(JointFreedom("fixed"))
-    coupled = still_following(names, freedoms)
+    coupled = freedoms(scene_object, armature, choice, UNMOVED in names)
     rig = Rig(name, names, parents, rest, bind, points[kept], faces, joints[kept], weights[kept], coupled)
     return RigReading(rig, sound.point_of, sound.face_of[cut], (*notes, *sound.notes, *cut_notes))
 
 
-def _translates(armature: Any, bone: str) -> bool:
-    """Roots move unless their location is locked altogether; the paper gives only the root a translation."""
-    pose_bone = armature.pose.bones[bone]
-    return pose_bone.parent is None and not all(pose_bone.lock_location)
+def freedoms(scene_object: Any, armature: Any, choice: str, unmoved: bool) -> tuple[JointFreedom, ...]:
+    """What a solve may do with each joint of the rig that `read_rig` gives, as the scene has it now.
+
+    unmoved: whether the rig has the joint of vertices that no bone moves.
+    """
+    joints = tuple(bone.name for bone in _depth_first(armature.data.bones))
+    found = bones.freedoms(scene_object, armature, joints, choice)
+    if unmoved:
+        joints, found = (*joints, UNMOVED), [*found, JointFreedom("fixed")]
+    return still_following(joints, found)
 
 
 def _depth_first(bones: Any) -> list[Any]:

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any
+
+import bpy
 
 from contact_blender.ids import ObjectIds
 from contact_core.document.frozen_map import FrozenMap
@@ -18,6 +21,16 @@ from contact_core.scene.host import DocumentStamp, StoredDocument, check_overwri
 
 KEY = "contact_core"
 TakeBack = Callable[[Any, ObjectIds], None]  # given scene and ids anew
+
+
+def open_file(source: Path) -> None:
+    """Let this process's Blender open a file. Raises FileRefused."""
+    if not source.is_file():
+        raise FileRefused(f"there is no file {source}.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(source.resolve()), load_ui=False)
+    except RuntimeError as error:
+        raise FileRefused(f"Blender cannot open {source}: {str(error).strip()}") from error
 
 
 def read_stamp(scene: Any) -> DocumentStamp | None:

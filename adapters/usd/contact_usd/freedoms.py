@@ -52,4 +52,5 @@ def freedom_to_json(freedom: JointFreedom) -> dict[str, object]:
         "locked": np.asarray(freedom.locked).tolist(),
         "follows": freedom.follows,
         "ratio": freedom.ratio,
+        "locked_translation": np.asarray(freedom.locked_translation).tolist(),
     }

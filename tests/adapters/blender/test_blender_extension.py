@@ -268,6 +268,11 @@ class Layout:
         if name == "label":
             self.texts.append(data.label)
 
+    def menu(self, name: str, text: str = "", icon: str = "NONE") -> None:
+        self.known(icon)
+        assert hasattr(self.bpy.types, name)
+        self.texts.append(text)
+
     def prop_search(
         self, data: Any, name: str, searched: Any, rows: str, text: str = "", icon: str = "NONE"
     ) -> None:

@@ -56,7 +56,7 @@ def test_a_chain_is_posed_without_evaluating_in_between(bpy: Any, arm: Any) -> N
         from contact_core.scene.reading import unstretch_pose
 
         stretch = np.eye(3) * 0.5
-        poses.write_pose(bpy.data.objects["arm"].parent, unstretch_pose(pose, stretch), None)
+        poses.write_pose(bpy.data.objects["arm"].parent, unstretch_pose(pose, stretch), None, pose.joints)
         assert evaluations == []
     finally:
         bpy.app.handlers.depsgraph_update_post.pop()
@@ -216,3 +216,76 @@ def test_a_failed_step_leaves_every_key_as_it_was(bpy: Any, arm: Any) -> None:
             arm.write_pose("arm", bent(rig, 7), frame)
             raise ZeroDivisionError
         assert (blender_scenes.whole_state(), handles()) == before
+
+
+def keyed_paths(armature: Any) -> set[str]:
+    from contact_blender.compat import fcurves
+
+    return {curve.data_path.rsplit(".", 1)[1] for curve in fcurves(armature)}
+
+
+@pytest.mark.parametrize(
+    ("chosen", "channels"),
+    [
+        ("Location, Rotation & Scale", {"location", "rotation_quaternion", "scale"}),
+        ("Rotation", {"rotation_quaternion"}),
+        ("Whole Character", {"location", "rotation_quaternion", "scale"}),
+        (None, {"location", "rotation_quaternion"}),
+    ],
+)
+def test_the_active_keying_set_says_what_is_keyed(
+    bpy: Any, arm: Any, chosen: str | None, channels: set[str]
+) -> None:
+    """Without one, what a pose sets: rotations, and where the root is."""
+    sets = bpy.context.scene.keying_sets_all
+    sets.active = None if chosen is None else next(each for each in sets if each.bl_label == chosen)
+    try:
+        arm.write_pose("arm", bent(arm.read_rig("arm").rig, 2), 5.0)
+    finally:
+        sets.active = None
+    assert keyed_paths(bpy.data.objects["arm"].parent) == channels
+    assert arm.pose_keys("arm") == (5.0,)
+
+
+def test_a_keying_set_of_single_paths_keys_those(bpy: Any, arm: Any) -> None:
+    armature, scene = bpy.data.objects["arm"].parent, bpy.context.scene
+    own = scene.keying_sets.new(name="elbow")
+    own.paths.add(armature, 'pose.bones["elbow"].rotation_quaternion')
+    own.paths.add(armature, "location")
+    rig = arm.read_rig("arm").rig
+    arm.write_pose("arm", bent(rig, 2), 5.0)
+    from contact_blender.compat import fcurves
+
+    assert {curve.data_path for curve in fcurves(armature)} == {'pose.bones["elbow"].rotation_quaternion'}
+    own.paths.remove(own.paths[0])
+    before = arm.read_pose("arm").local
+    with pytest.raises(InvalidInput, match="choose another keying set, or none"):
+        arm.write_pose("arm", bent(rig, 3), 6.0)
+    assert np.array_equal(arm.read_pose("arm").local, before) and arm.pose_keys("arm") == (5.0,)
+
+
+def test_keys_go_into_the_slot_of_the_armature_and_nowhere_else(bpy: Any, arm: Any) -> None:
+    """An action with another object's slot, and other channels of the armature: only the bones' curves change."""
+    armature = bpy.data.objects["arm"].parent
+    if not hasattr(bpy.types, "ActionSlot"):
+        pytest.skip("actions have slots from Blender 4.4 on")
+    lamp = bpy.data.objects.new("lamp", None)
+    bpy.context.scene.collection.objects.link(lamp)
+    lamp.keyframe_insert("location", frame=1)
+    action = lamp.animation_data.action
+    armature.animation_data_create().action = action
+    armature.animation_data.action_slot = action.slots.new("OBJECT", "arm")
+    armature.keyframe_insert("scale", frame=2)
+
+    def curves(owner: Any) -> dict[Any, Any]:
+        from contact_blender.compat import fcurves
+
+        return {(c.data_path, c.array_index): [tuple(k.co) for k in c.keyframe_points] for c in fcurves(owner)}
+
+    others, own = curves(lamp), curves(armature)
+    rig = arm.read_rig("arm").rig
+    arm.write_pose("arm", bent(rig, 2), 5.5)
+    assert armature.animation_data.action == action and len(action.slots) == 2 and len(action.layers) == 1
+    assert curves(lamp) == others and {key: curves(armature)[key] for key in own} == own
+    assert arm.pose_keys("arm") == (5.5,)  # between two frames
+    assert np.abs(arm.read_pose("arm", 5.5).local - bent(rig, 2).local).max() < 1e-6

@@ -356,6 +356,26 @@ def clear_pose(session: Any, context: Any, given: Any) -> str:
     return f"{surface} is at rest."
 
 
+@operator(
+    "choose_bones",
+    "Choose Bones",
+    "patch",
+    patch=PATCH,
+    bones=StringProperty(
+        name="Bones",
+        description="automatic, deform, controls, or collection:NAME for a bone collection",
+        default="automatic",
+    ),
+)
+def choose_bones(session: Any, context: Any, given: Any) -> str:
+    """Say which bones of the rig under a patch a solve may pose."""
+    from contact_blender.extension import where
+
+    surface = session.document.patch(where.patch_of(session, context, given.patch)).surface
+    session.surfaces.choose_bones(surface, given.bones)
+    return f"A solve poses the bones: {given.bones}."
+
+
 def _telling(session: Any) -> Any:
     """Settings of a solve that shows its progress, with the terms that it has beside the window."""
     from contact_core.proposals.proposal import SolveSettings

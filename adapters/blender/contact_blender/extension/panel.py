@@ -277,6 +277,19 @@ class CONTACT_PT_pose(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spe
         row.operator("contact.settle", text="Settle")
         row.operator("contact.slide", text="Slide")
         column.operator("contact.clear_pose", icon="LOOP_BACK")
+        _draw_bones(layout, settings.patch)
+
+
+class CONTACT_MT_bones(bpy.types.Menu):  # noqa: N801 (Blender's spelling)
+    """Which bones of the rig under the active patch a solve may pose."""
+
+    bl_label = "Bones"
+    bl_idname = "CONTACT_MT_bones"
+
+    def draw(self, context: Any) -> None:
+        found = _rig_under(context.window_manager.contact.patch)
+        for choice, label in found[1] if found else ():
+            self.layout.operator("contact.choose_bones", text=label).bones = choice
 
 
 class CONTACT_PT_time(_OfPatches, bpy.types.Panel):  # noqa: N801 (Blender's spelling)
@@ -314,7 +327,27 @@ PANELS = (
     CONTACT_PT_pairs,
     CONTACT_PT_time,
     CONTACT_PT_pose,
+    CONTACT_MT_bones,
 )
+
+
+def _draw_bones(layout: Any, patch: str) -> None:
+    """The choice of the rig under a patch, nothing on what has none."""
+    found = _rig_under(patch)
+    if found is not None:
+        layout.menu("CONTACT_MT_bones", text=f"Bones: {dict(found[1]).get(found[0], found[0])}", icon="BONE_DATA")
+
+
+def _rig_under(patch: str) -> tuple[str, list[tuple[str, str]]] | None:
+    """Of the rig under a patch: what is chosen, and (choice, label) of what can be."""
+    held = shared.held()
+    if held is None or patch not in held.session.document.patches:
+        return None
+    bound = held.session.binding.surfaces.get(held.session.document.patch(patch).surface)
+    if bound is None or bound.rig is None:
+        return None
+    host = held.session.host
+    return host.bones_of(bound.object_id), host.bone_choices(bound.object_id)
 
 
 def _draw_start(layout: Any) -> None:
