@@ -248,6 +248,101 @@ def test_settings_of_the_header_reach_the_tool(bpy: Any, artist: Any) -> None:
     assert held.paint.radius == pytest.approx(0.25 * 1.15, rel=1e-5)
 
 
+class Row:
+    """Keeps what is drawn into a header: property and text."""
+
+    def __init__(self, drawn: list[tuple[str, str | None]]) -> None:
+        self.drawn = drawn
+
+    def row(self, align: bool = False) -> Row:
+        return self
+
+    def prop(self, group: Any, name: str, text: str | None = None, icon: str = "", toggle: bool = False) -> None:
+        assert name in group.bl_rna.properties
+        self.drawn.append((name, text))
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+def test_a_radius_that_is_left_open_says_automatic(bpy: Any, artist: Any, unit: float) -> None:
+    """Not "0 m"; a click gives a number of one's own, a centimetre first, another one leaves it open again."""
+    from contact_blender.extension import settings
+
+    held, (told,) = bpy.context.window_manager.contact_tools, [t for t in settings.tools() if t["name"] == "paint"]
+    bpy.context.scene.unit_settings.scale_length = unit
+
+    def header() -> list[tuple[str, str | None]]:
+        drawn: list[tuple[str, str | None]] = []
+        settings.draw(Row(drawn), held.paint, told["settings"])
+        return [each for each in drawn if "radius" in each[0]]
+
+    held.paint.radius = 0.0
+    assert header() == [("radius_is_automatic", "Radius: automatic")]
+    assert settings.values_of_tools(bpy.context)["paint"]["radius"] is None
+    held.paint.radius_is_automatic = False
+    assert held.paint.radius == pytest.approx(0.01 / unit) and header()[0] == ("radius", None)
+    held.paint.radius_is_automatic = True
+    assert held.paint.radius == 0.0 and len(header()) == 1
+
+
+# Maps that are heard in the 3D view of these modes; a tool's own keymap comes before them.
+HEARD = ("Window", "Screen", "Screen Editing", "Frames", "3D View Generic", "3D View", "Object Non-modal")
+MODES = {"OBJECT": "Object Mode", "POSE": "Pose", "PAINT_WEIGHT": "Weight Paint"}
+# What a tool in the hand must leave to Blender, whatever it does: undo, files, playback, views, modes, sidebars.
+NEVER = frozenset((
+    "ed.undo", "ed.redo", "wm.save_mainfile", "wm.save_as_mainfile", "wm.open_mainfile", "wm.read_homefile",
+    "wm.search_menu", "wm.quit_blender", "screen.animation_play", "screen.repeat_last", "object.mode_set",
+    "view3d.object_mode_pie_or_toggle", "wm.toolbar", "view3d.rotate", "view3d.move", "view3d.zoom",
+    "view3d.view_axis", "view3d.view_selected", "view3d.view_all", "view3d.localview", "view3d.view_camera",
+    "screen.frame_jump", "screen.keyframe_jump", "screen.frame_offset", "wm.call_menu_pie_snap",
+))  # fmt: skip
+
+
+def chord(item: Any) -> tuple[Any, ...]:
+    held = ("shift", "ctrl", "alt", "oskey")
+    return (item["type"], *(bool(item.get(name)) and item.get(name) != -1 for name in held))
+
+
+def blenders(bpy: Any) -> dict[str, list[tuple[tuple[Any, ...], str]]]:
+    """Blender's default keys by map: those that it would make with a window, from the Python that says them."""
+    there = Path(bpy.utils.resource_path("LOCAL")) / "scripts/presets/keyconfig/keymap_data/blender_default.py"
+    spec = importlib.util.spec_from_file_location("blender_default", there)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    maps = {name: content["items"] for name, _, content in module.generate_keymaps()}
+    assert sum(map(len, maps.values())) > 2500  # not the few that a Blender without a window has
+    pressed = ("PRESS", "CLICK", "DOUBLE_CLICK", "CLICK_DRAG", "ANY")
+    return {
+        name: [(chord(item), operator) for operator, item, _ in items if item["value"] in pressed]
+        for name, items in maps.items()
+    }
+
+
+def test_the_key_that_acts_everywhere_is_free(bpy: Any) -> None:
+    """The pie menu's, in the 3D view of Object, Pose and Weight Paint mode; and tools are in no other mode."""
+    from contact_blender.extension import toolbar
+
+    maps, pie = blenders(bpy), chord(toolbar.PIE_CHORD)
+    for name in (*HEARD, *MODES.values()):
+        assert [operator for key, operator in maps[name] if key == pie] == [], name
+    assert set(toolbar.MODES) == {"OBJECT", "POSE"}  # so in Weight Paint mode nothing else of ours is heard
+
+
+def test_what_a_tool_in_the_hand_takes_from_blender_is_told(bpy: Any) -> None:
+    """Keys of tools act only while one is in the hand; what they take then is on the page, and nothing vital."""
+    from contact_blender.extension import chords, settings, toolbar
+
+    maps = blenders(bpy)
+    ours = {c: chord(chords.item_of(c)) for a in settings.table()["actions"] for c in chords.chords_of(a)}
+    page = (ADAPTER / "README.md").read_text(encoding="utf-8")
+    told = page.partition("takes from Blender while it is in the hand:")[2].partition(".\n")[0]
+    for name in (*HEARD, *(MODES[mode] for mode in toolbar.MODES)):
+        taken = {ours_: op for ours_, key in ours.items() for theirs, op in maps[name] if theirs == key}
+        assert NEVER.isdisjoint(taken.values()), (name, taken)
+        unsaid = {c: op for c, op in taken.items() if f"`{c}`" not in told}
+        assert not unsaid, f"{name}: say in adapters/blender/README.md that a tool takes {unsaid}"
+
+
 def test_the_end_of_the_file_ends_the_interaction(bpy: Any, artist: Any, tmp_path: Path) -> None:
     from contact_blender.extension import shared
 

@@ -15,6 +15,7 @@ from typing import Any
 import bpy
 
 _GROUP = bpy.types.PropertyGroup
+_CENTIMETRE = 0.01  # metres
 _OPEN = "AUTO"  # of a choice that may be left open
 LEFT_OUT = frozenset(("xray", "isolate", "heat"))  # Blender's own shading and local view do this
 Plain = Mapping[str, Any]
@@ -49,7 +50,31 @@ def groups() -> tuple[Any, ...]:
 
 def _group(name: str, settings: list[Plain]) -> Any:
     properties = {each["name"]: _property(each) for each in settings}
+    properties |= {_switch(each["name"]): _left_open(each["name"]) for each in settings if _may_be_open(each)}
     return type(f"ContactSettings_{name}", (_GROUP,), {"__annotations__": properties, "__module__": __name__})
+
+
+def _may_be_open(setting: Plain) -> bool:
+    """Whether a setting is a number that a tool may leave open: it says "automatic" in place of its 0."""
+    return bool(setting["optional"]) and setting["kind"] in ("number", "count")
+
+
+def _switch(name: str) -> str:
+    return f"{name}_is_automatic"
+
+
+def _left_open(name: str) -> Any:
+    """Whether a number is left open; switched off, it starts at a centimetre."""
+
+    def read(group: Any) -> bool:
+        return not getattr(group, name)
+
+    def write(group: Any, automatic: bool) -> None:
+        if automatic or not getattr(group, name):
+            setattr(group, name, 0.0 if automatic else _CENTIMETRE / bpy.context.scene.unit_settings.scale_length)
+
+    said = "Found for each surface by itself; click for a number of your own, or back"
+    return bpy.props.BoolProperty(name="Automatic", description=said, get=read, set=write)
 
 
 def _property(setting: Plain) -> Any:
@@ -132,4 +157,11 @@ def follow(context: Any, interaction: Any) -> None:
 def draw(layout: Any, group: Any, settings: list[Plain]) -> None:
     """Each setting in its row or column."""
     for setting in settings:
-        layout.prop(group, setting["name"])
+        name = setting["name"]
+        row = layout.row(align=True) if _may_be_open(setting) else layout
+        if not _may_be_open(setting) or not getattr(group, _switch(name)):
+            row.prop(group, name)
+            if row is not layout:
+                row.prop(group, _switch(name), text="", icon="LOOP_BACK", toggle=True)
+        else:
+            row.prop(group, _switch(name), text=f"{name.capitalize()}: automatic", toggle=True)
