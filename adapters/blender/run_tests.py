@@ -97,6 +97,7 @@ def _started(python: Path, command: list[str], variables: dict[str, str]) -> sub
     """
     with tempfile.TemporaryDirectory(prefix="contact-blender-", ignore_cleanup_errors=True) as folder:
         own = {**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder), "BLENDER_USER_RESOURCES": folder}
+        own["PYTHON_OF_THE_SUITE"] = sys.executable  # which may have what no Blender has: OpenUSD's own library
         process = subprocess.Popen(
             [str(python), "-X", "faulthandler", *command],
             cwd=REPOSITORY,

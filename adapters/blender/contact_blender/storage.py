@@ -66,8 +66,13 @@ def write(
 ) -> TakeBack:
     """Change the document, with (id, object) pairs; returns what takes that back, for a step that fails.
 
-    Raises FileRefused where a newer release wrote what is there, or it is damaged.
+    Raises FileRefused where a newer release wrote what is there, or it is damaged, and for a scene of another file.
     """
+    if scene.library is not None:
+        raise FileRefused(
+            f"the scene {scene.name!r} is linked from {scene.library.filepath}, so contacts in it are not saved:"
+            " work in a scene of this file that has the same objects."
+        )
     before = read_stamp(scene)
     check_overwrite(before)
     if before is None:

@@ -201,6 +201,22 @@ def test_an_overridden_character_is_painted_solved_saved_and_reopened(
         again.undo()
 
 
+def test_a_linked_scene_keeps_no_document(bpy: Any, empty: Any, scenes: Any, tmp_path: Path) -> None:
+    """It would be gone with the file: refused in words, which say where the user may write."""
+    from contact_blender import storage
+    from contact_core.errors import FileRefused
+    from contact_core.scene.host import DocumentStamp
+
+    bpy.context.scene.name = "set"
+    empty.save(tmp_path / "set.blend")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "set.blend"), link=True) as (_, here):
+        here.scenes = ["set"]
+    with pytest.raises(FileRefused, match="work in a scene of this file"):
+        storage.write(here.scenes[0], DocumentStamp(1, "digest", 1), {"a": "b"}, (), ())
+    assert storage.KEY not in here.scenes[0]
+
+
 def test_an_asset_that_was_updated_is_rebound(bpy: Any, empty: Any, scenes: Any, tmp_path: Path) -> None:
     """A linked ball with finer triangles: the contact is projected onto it and the document knows the new mesh."""
     library = tmp_path / "ball.blend"

@@ -30,6 +30,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "pose.suggest": ("Shift+J",),
     "pose.rest": ("Alt+R",),
     "pose.key": ("I",),
+    "film.solve": ("Shift+Alt+Enter",),
     "film.window": ("Alt+T",),
 }
 # Blender does these, beside what the table leaves to the front end.
