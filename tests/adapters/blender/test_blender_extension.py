@@ -268,6 +268,10 @@ class Layout:
         if name == "label":
             self.texts.append(data.label)
 
+    def operator_menu_enum(self, name: str, choices: str) -> None:
+        known = getattr(self.bpy.ops.contact, name.removeprefix("contact.")).get_rna_type().properties
+        assert choices in known
+
     def menu(self, name: str, text: str = "", icon: str = "NONE") -> None:
         self.known(icon)
         assert hasattr(self.bpy.types, name)
