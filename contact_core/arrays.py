@@ -13,6 +13,8 @@ from contact_core.errors import InvalidInput
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+Int32Array = npt.NDArray[np.int32]
+SingleArray = npt.NDArray[np.float32]
 ComplexArray = npt.NDArray[np.complex128]
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import FloatArray, Int32Array, IntArray, SingleArray
 from contact_core.geometry.box_tree import Dipoles, Tree
 from contact_core.geometry.jit import kernel
 
@@ -24,19 +24,29 @@ def cast(
 
 
 def closest(
-    tree: Tree, normals: FloatArray, points: FloatArray, facing: FloatArray, facing_limit: float, limit: float
+    tree: Tree, points: FloatArray, facing: FloatArray, facing_limit: float, limit: float
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Closest points of k queries: faces (-1: none), barycentric (k, 3), distance. facing: (k, 3) or (0, 3)."""
     faces, barycentric, distance = _blank(len(points))
-    scratch = np.empty(3), np.empty(STACK, np.int64)
-    _closest(*tree, normals, points, facing, facing_limit, limit, *scratch, faces, barycentric, distance)
+    stack = np.empty(STACK, np.int64)
+    _closest(*tree, points, facing, facing_limit, limit, np.empty(3), stack, faces, barycentric, distance)
     return faces, barycentric, distance
 
 
 def winding(tree: Tree, nodes: Dipoles, points: FloatArray, accuracy: float) -> FloatArray:
     """(k,) generalised winding numbers of points (k, 3)."""
     result = np.zeros(len(points))
-    _winding(tree.triangles, tree.starts, *nodes, points, accuracy, np.empty(STACK, np.int64), result)
+    _winding(
+        tree.points,
+        tree.faces,
+        tree.order,
+        tree.levels,
+        *nodes,
+        points,
+        accuracy,
+        np.empty(STACK, np.int64),
+        result,
+    )
     return result
 
 
@@ -45,13 +55,19 @@ def _blank(k: int) -> tuple[IntArray, FloatArray, FloatArray]:
 
 
 @kernel
+def _in_frame(frame: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A point in the frame that boxes are in."""
+    return (x - frame[0]) * frame[3], (y - frame[1]) * frame[3], (z - frame[2]) * frame[3]
+
+
+@kernel
 def _box_entry(
-    low: FloatArray, high: FloatArray, node: int, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
+    boxes: SingleArray, node: int, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
 ) -> float:
     """Where a ray enters a node's box, inf if it misses it: the slab test, kept conservative by rounding out."""
-    ax, bx = (low[node, 0] - ox) * ix, (high[node, 0] - ox) * ix
-    ay, by = (low[node, 1] - oy) * iy, (high[node, 1] - oy) * iy
-    az, bz = (low[node, 2] - oz) * iz, (high[node, 2] - oz) * iz
+    ax, bx = (boxes[node, 0] - ox) * ix, (boxes[node, 3] - ox) * ix
+    ay, by = (boxes[node, 1] - oy) * iy, (boxes[node, 4] - oy) * iy
+    az, bz = (boxes[node, 2] - oz) * iz, (boxes[node, 5] - oz) * iz
     near, far = 0.0, np.inf
     # NaN (0 * inf: the origin lies in a slab's plane) compares false and leaves the interval alone.
     if min(ax, bx) > near:
@@ -71,11 +87,12 @@ def _box_entry(
 
 @kernel
 def _cast(
-    order: IntArray,
-    triangles: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    starts: IntArray,
+    mesh_points: FloatArray,
+    mesh_faces: IntArray,
+    order: Int32Array,
+    boxes: SingleArray,
+    frame: FloatArray,
+    levels: int,
     origins: FloatArray,
     directions: FloatArray,
     limit: float,
@@ -85,7 +102,7 @@ def _cast(
     distances: FloatArray,
 ) -> None:
     """First hits of rays into faces, barycentric, distances."""
-    leaves = len(starts) - 1
+    leaves = 1 << levels
     for i in range(len(origins)):
         kz = 0
         for axis in range(1, 3):
@@ -96,10 +113,10 @@ def _cast(
         sx = directions[i, kx] / directions[i, kz]
         sy = directions[i, ky] / directions[i, kz]
         sz = 1.0 / directions[i, kz]
-        ox, oy, oz = origins[i, 0], origins[i, 1], origins[i, 2]
-        ix = 1.0 / directions[i, 0] if directions[i, 0] != 0.0 else np.inf
-        iy = 1.0 / directions[i, 1] if directions[i, 1] != 0.0 else np.inf
-        iz = 1.0 / directions[i, 2] if directions[i, 2] != 0.0 else np.inf
+        ox, oy, oz = _in_frame(frame, origins[i, 0], origins[i, 1], origins[i, 2])
+        ix = 1.0 / (directions[i, 0] * frame[3]) if directions[i, 0] != 0.0 else np.inf
+        iy = 1.0 / (directions[i, 1] * frame[3]) if directions[i, 1] != 0.0 else np.inf
+        iz = 1.0 / (directions[i, 2] * frame[3]) if directions[i, 2] != 0.0 else np.inf
         best = limit
         found = -1
         top = 0
@@ -107,11 +124,11 @@ def _cast(
         while top >= 0:
             node = stack[top]
             top -= 1
-            if _box_entry(low, high, node, ox, oy, oz, ix, iy, iz) > best:
+            if _box_entry(boxes, node, ox, oy, oz, ix, iy, iz) > best:
                 continue
             if node < leaves - 1:
-                left = _box_entry(low, high, 2 * node + 1, ox, oy, oz, ix, iy, iz)
-                right = _box_entry(low, high, 2 * node + 2, ox, oy, oz, ix, iy, iz)
+                left = _box_entry(boxes, 2 * node + 1, ox, oy, oz, ix, iy, iz)
+                right = _box_entry(boxes, 2 * node + 2, ox, oy, oz, ix, iy, iz)
                 near_child = 2 * node + 1 if left <= right else 2 * node + 2
                 if max(left, right) <= best and max(left, right) < np.inf:
                     top += 1
@@ -120,16 +137,24 @@ def _cast(
                     top += 1
                     stack[top] = near_child
                 continue
-            for t in range(starts[node - leaves + 1], starts[node - leaves + 2]):
-                az = triangles[t, kz] - origins[i, kz]
-                bz = triangles[t, 3 + kz] - origins[i, kz]
-                cz = triangles[t, 6 + kz] - origins[i, kz]
-                ax = triangles[t, kx] - origins[i, kx] - sx * az
-                ay = triangles[t, ky] - origins[i, ky] - sy * az
-                bx = triangles[t, 3 + kx] - origins[i, kx] - sx * bz
-                by = triangles[t, 3 + ky] - origins[i, ky] - sy * bz
-                cx = triangles[t, 6 + kx] - origins[i, kx] - sx * cz
-                cy = triangles[t, 6 + ky] - origins[i, ky] - sy * cz
+            for t in range(
+                ((node - leaves + 1) * len(order)) >> levels, ((node - leaves + 2) * len(order)) >> levels
+            ):
+                f = order[t]
+                a, b, c = (
+                    mesh_points[mesh_faces[f, 0]],
+                    mesh_points[mesh_faces[f, 1]],
+                    mesh_points[mesh_faces[f, 2]],
+                )
+                az = a[kz] - origins[i, kz]
+                bz = b[kz] - origins[i, kz]
+                cz = c[kz] - origins[i, kz]
+                ax = a[kx] - origins[i, kx] - sx * az
+                ay = a[ky] - origins[i, ky] - sy * az
+                bx = b[kx] - origins[i, kx] - sx * bz
+                by = b[ky] - origins[i, ky] - sy * bz
+                cx = c[kx] - origins[i, kx] - sx * cz
+                cy = c[ky] - origins[i, ky] - sy * cz
                 u = cx * by - cy * bx
                 v = ax * cy - ay * cx
                 w = bx * ay - by * ax
@@ -141,43 +166,37 @@ def _cast(
                 distance = sz * (u * az + v * bz + w * cz) / total
                 if distance < 0.0 or distance > best:
                     continue
-                if distance == best and found >= 0 and order[t] > order[found]:
+                if distance == best and found >= 0 and f > found:
                     continue
                 best = distance
-                found = t
+                found = f
                 barycentric[i, 0] = u / total
                 barycentric[i, 1] = v / total
                 barycentric[i, 2] = w / total
         if found >= 0:
-            faces[i] = order[found]
+            faces[i] = found
             distances[i] = best
 
 
 @kernel
-def _box_distance(low: FloatArray, high: FloatArray, node: int, x: float, y: float, z: float) -> float:
+def _box_distance(boxes: SingleArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance of a point to a node's box."""
-    dx = max(low[node, 0] - x, x - high[node, 0], 0.0)
-    dy = max(low[node, 1] - y, y - high[node, 1], 0.0)
-    dz = max(low[node, 2] - z, z - high[node, 2], 0.0)
+    dx = max(boxes[node, 0] - x, x - boxes[node, 3], 0.0)
+    dy = max(boxes[node, 1] - y, y - boxes[node, 4], 0.0)
+    dz = max(boxes[node, 2] - z, z - boxes[node, 5], 0.0)
     return dx * dx + dy * dy + dz * dz
 
 
 @kernel
-def _closest_on_triangle(triangles: FloatArray, t: int, x: float, y: float, z: float, out: FloatArray) -> float:
-    """Barycentric coordinates of the closest point of triangle t to (x, y, z) into out; its squared distance."""
-    abx, aby, abz = (
-        triangles[t, 3] - triangles[t, 0],
-        triangles[t, 4] - triangles[t, 1],
-        triangles[t, 5] - triangles[t, 2],
-    )
-    acx, acy, acz = (
-        triangles[t, 6] - triangles[t, 0],
-        triangles[t, 7] - triangles[t, 1],
-        triangles[t, 8] - triangles[t, 2],
-    )
-    apx, apy, apz = x - triangles[t, 0], y - triangles[t, 1], z - triangles[t, 2]
-    bpx, bpy, bpz = x - triangles[t, 3], y - triangles[t, 4], z - triangles[t, 5]
-    cpx, cpy, cpz = x - triangles[t, 6], y - triangles[t, 7], z - triangles[t, 8]
+def _closest_on_triangle(
+    a: FloatArray, b: FloatArray, c: FloatArray, x: float, y: float, z: float, out: FloatArray
+) -> float:
+    """Barycentric coordinates of the closest point of triangle abc to (x, y, z) into out; its squared distance."""
+    abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    apx, apy, apz = x - a[0], y - a[1], z - a[2]
+    bpx, bpy, bpz = x - b[0], y - b[1], z - b[2]
+    cpx, cpy, cpz = x - c[0], y - c[1], z - c[2]
     d1 = abx * apx + aby * apy + abz * apz
     d2 = acx * apx + acy * apy + acz * apz
     d3 = abx * bpx + aby * bpy + abz * bpz
@@ -195,7 +214,7 @@ def _closest_on_triangle(triangles: FloatArray, t: int, x: float, y: float, z: f
         v = 1.0
     elif d6 >= 0.0 and d5 <= d6:
         w = 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0 and d1 > d3:  # else corners a and b are one
         v = d1 / (d1 - d3)
     elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
         w = d2 / (d2 - d6)
@@ -216,12 +235,12 @@ def _closest_on_triangle(triangles: FloatArray, t: int, x: float, y: float, z: f
 
 @kernel
 def _closest(
-    order: IntArray,
-    triangles: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    starts: IntArray,
-    normals: FloatArray,
+    mesh_points: FloatArray,
+    mesh_faces: IntArray,
+    order: Int32Array,
+    boxes: SingleArray,
+    frame: FloatArray,
+    levels: int,
     points: FloatArray,
     facing: FloatArray,
     facing_limit: float,
@@ -233,40 +252,46 @@ def _closest(
     distance: FloatArray,
 ) -> None:
     """Closest points of queries into faces, barycentric, distance."""
-    leaves = len(starts) - 1
+    leaves = 1 << levels
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        qx, qy, qz = _in_frame(frame, x, y, z)
         best = limit * limit
+        near = best * frame[3] * frame[3]  # in the frame
         top = 0
         stack[0] = 0
         while top >= 0:
             node = stack[top]
             top -= 1
-            if _box_distance(low, high, node, x, y, z) > best:
+            if _box_distance(boxes, node, qx, qy, qz) > near:
                 continue
             if node < leaves - 1:
-                left = _box_distance(low, high, 2 * node + 1, x, y, z)
-                right = _box_distance(low, high, 2 * node + 2, x, y, z)
+                left = _box_distance(boxes, 2 * node + 1, qx, qy, qz)
+                right = _box_distance(boxes, 2 * node + 2, qx, qy, qz)
                 near_child = 2 * node + 1 if left <= right else 2 * node + 2
-                if max(left, right) <= best:
+                if max(left, right) <= near:
                     top += 1
                     stack[top] = 4 * node + 3 - near_child
-                if min(left, right) <= best:
+                if min(left, right) <= near:
                     top += 1
                     stack[top] = near_child
                 continue
-            for t in range(starts[node - leaves + 1], starts[node - leaves + 2]):
+            for t in range(
+                ((node - leaves + 1) * len(order)) >> levels, ((node - leaves + 2) * len(order)) >> levels
+            ):
                 f = order[t]
-                if len(facing):
-                    cosine = (
-                        normals[f, 0] * facing[i, 0] + normals[f, 1] * facing[i, 1] + normals[f, 2] * facing[i, 2]
-                    )
-                    if cosine > facing_limit:
-                        continue
-                squared = _closest_on_triangle(triangles, t, x, y, z, out)
+                a, b, c = (
+                    mesh_points[mesh_faces[f, 0]],
+                    mesh_points[mesh_faces[f, 1]],
+                    mesh_points[mesh_faces[f, 2]],
+                )
+                if len(facing) and _looks_away(a, b, c, facing[i, 0], facing[i, 1], facing[i, 2], facing_limit):
+                    continue
+                squared = _closest_on_triangle(a, b, c, x, y, z, out)
                 if squared > best or (squared == best and faces[i] >= 0 and f > faces[i]):
                     continue
                 best = squared
+                near = best * frame[3] * frame[3]
                 faces[i] = f
                 barycentric[i, 0] = out[0]
                 barycentric[i, 1] = out[1]
@@ -275,11 +300,21 @@ def _closest(
 
 
 @kernel
-def _solid_angle(triangles: FloatArray, t: int, x: float, y: float, z: float) -> float:
-    """Signed solid angle of triangle t seen from (x, y, z) (van Oosterom and Strackee 1983)."""
-    ax, ay, az = triangles[t, 0] - x, triangles[t, 1] - y, triangles[t, 2] - z
-    bx, by, bz = triangles[t, 3] - x, triangles[t, 4] - y, triangles[t, 5] - z
-    cx, cy, cz = triangles[t, 6] - x, triangles[t, 7] - y, triangles[t, 8] - z
+def _looks_away(a: FloatArray, b: FloatArray, c: FloatArray, x: float, y: float, z: float, limit: float) -> bool:
+    """Whether the normal of triangle abc (0: no area) and a unit vector (x, y, z) have a cosine above a limit."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    return nx * x + ny * y + nz * z > limit * length if length > 0.0 else limit < 0.0
+
+
+@kernel
+def _solid_angle(p: FloatArray, q: FloatArray, r: FloatArray, x: float, y: float, z: float) -> float:
+    """Signed solid angle of triangle pqr seen from (x, y, z) (van Oosterom and Strackee 1983)."""
+    ax, ay, az = p[0] - x, p[1] - y, p[2] - z
+    bx, by, bz = q[0] - x, q[1] - y, q[2] - z
+    cx, cy, cz = r[0] - x, r[1] - y, r[2] - z
     a = np.sqrt(ax * ax + ay * ay + az * az)
     b = np.sqrt(bx * bx + by * by + bz * bz)
     c = np.sqrt(cx * cx + cy * cy + cz * cz)
@@ -292,8 +327,10 @@ def _solid_angle(triangles: FloatArray, t: int, x: float, y: float, z: float) ->
 
 @kernel
 def _winding(
-    triangles: FloatArray,
-    starts: IntArray,
+    mesh_points: FloatArray,
+    mesh_faces: IntArray,
+    order: Int32Array,
+    levels: int,
     area: FloatArray,
     centre: FloatArray,
     radius: FloatArray,
@@ -303,7 +340,7 @@ def _winding(
     result: FloatArray,
 ) -> None:
     """Generalised winding numbers of points into result."""
-    leaves = len(starts) - 1
+    leaves = 1 << levels
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         total = 0.0
@@ -324,6 +361,14 @@ def _winding(
                 stack[top + 2] = 2 * node + 2
                 top += 2
             else:
-                for t in range(starts[node - leaves + 1], starts[node - leaves + 2]):
-                    total += _solid_angle(triangles, t, x, y, z)
+                for t in range(
+                    ((node - leaves + 1) * len(order)) >> levels, ((node - leaves + 2) * len(order)) >> levels
+                ):
+                    f = order[t]
+                    p, q, r = (
+                        mesh_points[mesh_faces[f, 0]],
+                        mesh_points[mesh_faces[f, 1]],
+                        mesh_points[mesh_faces[f, 2]],
+                    )
+                    total += _solid_angle(p, q, r, x, y, z)
         result[i] = total / (4.0 * np.pi)

@@ -59,7 +59,6 @@ class Locator:
             self._tree = box_tree.build(mesh.points, mesh.faces)
         else:
             self._tree = box_tree.refitted(like._tree, mesh.points, mesh.faces)
-        self._normals = mesh.face_normals
         self._dipoles: box_tree.Dipoles | None = None
 
     @classmethod
@@ -102,9 +101,8 @@ class Locator:
             raise InvalidInput(
                 f"facing needs one direction per point, but got {len(directions)} for {len(points)} points."
             )
-        faces, barycentric, distance = box_kernels.closest(
-            self._tree, self._normals, points, directions, float(facing_limit), float(max_distance)
-        )
+        limits = float(facing_limit), float(max_distance)
+        faces, barycentric, distance = box_kernels.closest(self._tree, points, directions, *limits)
         found = faces >= 0
         return Closest(SurfacePoints(np.where(found, faces, 0), barycentric), distance, found)
 

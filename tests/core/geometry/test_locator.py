@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contact_core.errors import InvalidInput
+from contact_core.geometry import box_tree
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
@@ -159,3 +160,36 @@ def test_one_face_and_bad_input() -> None:
         locator.closest([[np.nan, 0, 0]])
     with pytest.raises(InvalidInput, match="faces"):
         Locator(TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), int)))
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1.0, 1e30])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_ray_along_an_axis_onto_a_vertex_hits(axis: int, scale: float) -> None:
+    """Such a ray runs in the faces of boxes: those are a little wider than what they hold."""
+    mesh = cached_family("sphere")
+    mesh = mesh.with_points(scale * mesh.points)
+    away = 3.0 * scale * np.eye(3)[axis]
+    assert Locator.of(mesh).cast(mesh.points + away, np.tile(-np.eye(3)[axis], (len(mesh.points), 1))).found.all()
+
+
+def test_a_tree_is_smaller_than_its_mesh() -> None:
+    tree = box_tree.build((mesh := cached_family("noisy")).points, mesh.faces)
+    assert tree.points is mesh.points and tree.faces is mesh.faces
+    assert tree.order.nbytes + tree.boxes.nbytes <= mesh.faces.nbytes + 24
+
+
+def test_far_from_the_origin_nothing_else_is_closest() -> None:
+    mesh = cached_family("sphere")
+    far = mesh.with_points(np.round(mesh.points * 2**20) / 2**20 + 2.0**20)  # moved without rounding
+    near = mesh.with_points(far.points - 2.0**20)
+    queries = np.random.default_rng(2).integers(-(2**21), 2**21, (40, 3)) / 2**20
+    here, there = Locator.of(near).closest(queries), Locator.of(far).closest(queries + 2.0**20)
+    np.testing.assert_array_equal(here.points.faces, there.points.faces)
+    np.testing.assert_array_equal(here.distance, there.distance)
+
+
+@pytest.mark.parametrize("corners", [[0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 0, 0]])
+def test_a_face_with_equal_corners_is_a_segment(corners: list[int]) -> None:
+    mesh = TriangleMesh([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]], [corners])
+    expected = 1.0 if 1 in corners else np.sqrt(2.0)
+    assert Locator.of(mesh).closest([[1.0, 1.0, 0.0]]).distance[0] == pytest.approx(expected)
