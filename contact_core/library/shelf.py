@@ -177,7 +177,12 @@ class Library:
             shutil.rmtree(stage, ignore_errors=True)
 
     def _placed(self, stage: Path, name: str, replace: bool) -> int:
-        """Rename the written folder to the first version that nobody took."""
+        """Rename the written folder to the first version that nobody took, if all of it is there."""
+        if not all((stage / file).is_file() for file in (GRASP, CONTACTS)):
+            raise FileRefused(
+                f"another machine, whose clock is a day ahead, took the unfinished grasp {name!r} for litter. Set"
+                " the clocks right, and save it again."
+            )
         home = self.folder / name
         home.mkdir(exist_ok=True)
         for _ in range(100):
