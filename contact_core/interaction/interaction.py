@@ -22,8 +22,9 @@ from contact_core.interaction.film import FilmDesk
 from contact_core.interaction.film_solving import stale_window
 from contact_core.interaction.heat import HeatMap
 from contact_core.interaction.holding import Holding
-from contact_core.interaction.live import LiveSolve, prepare
+from contact_core.interaction.live import LiveSolve
 from contact_core.interaction.overlay import NOTHING, Overlay
+from contact_core.interaction.preparing import preparation
 from contact_core.interaction.proposing import Proposing
 from contact_core.interaction.radius import RadiusGesture
 from contact_core.interaction.status import Changes, Status
@@ -136,15 +137,12 @@ class Interaction(Holding):
             self._touch("overlay")
 
     def prepare(self) -> None:
-        """Build beside the window what the first drag would wait for: trees, normals and depths of all surfaces.
+        """Build beside the window what the first drag would wait for: trees, normals, and what is solid.
 
         For front ends, when files are open. It steps back for a solve, and changes nothing but the waiting.
         """
         if self.worker.status is None:
-            surfaces = tuple(
-                (seen.rest, name in self.session.rigs) for name, seen in self.desk.scene.surfaces.items()
-            )
-            self.worker.begin("Prepare", lambda progress: prepare(surfaces, progress), lambda _: None)
+            self.worker.begin("Prepare", preparation(self.desk), lambda _: None)
 
     @property
     def is_due(self) -> bool:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,18 +11,13 @@ from contact_core.arrays import FloatArray
 from contact_core.document.document import ContactDocument
 from contact_core.edit.command import Command
 from contact_core.edit.commands import SetPose
-from contact_core.errors import InvalidInput
-from contact_core.geometry.mesh import TriangleMesh
-from contact_core.geometry.raycast import Locator
 from contact_core.grasping.filled import KeepOutOfHollowsTerm
 from contact_core.interaction.work import Worker
 from contact_core.plugins.registry import POSE_SOLVERS, POSE_TERMS
-from contact_core.progress import Progress
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, contact_of, poses_of, problem_of, world_from_surface
 from contact_core.solve.body import PairedPoints
 from contact_core.solve.levenberg_marquardt import FIRST_DAMPING, few_steps
-from contact_core.solve.penetration import RESOLUTION
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 from contact_core.solve.stretch import SkinStretchTerm
@@ -194,6 +188,16 @@ class LiveSolve:
             self._warm = kind, problem
         return problem
 
+    def before_any_contact(self) -> tuple[PoseProblem, ...]:
+        """For each hand the problem of a drag, but for its contacts: what its terms keep can be built with it.
+
+        Rigs that only the host can evaluate are left out.
+        """
+        scene, rigs = self._desk.scene.surfaces, self._desk.session.rigs
+        things = tuple(name for name in scene if name not in rigs and len(scene[name].rest.faces))
+        made = (self._made(self._desk.document, (), (name, *things)) for name in scene if name in rigs)
+        return tuple(each for each in made if all(body.black_box is None for body in each.bodies))
+
     def _made(
         self, document: ContactDocument, contacts: tuple[PairedPoints, ...], pulled: tuple[str, ...]
     ) -> PoseProblem:
@@ -261,25 +265,6 @@ class KeptContacts:
             )
         self._kept[name] = tuple(made_of), contact
         return contact
-
-
-def prepare(surfaces: Sequence[tuple[TriangleMesh, bool]], progress: Progress) -> None:
-    """Build what meshes keep for picking and for the live solve. surfaces: each mesh, and whether it bends.
-
-    Raises Cancelled. What cannot be built is left to the solve that needs it, which says why.
-    """
-    from contact_core.geometry.distance_field import DistanceField
-
-    for number, (mesh, bends) in enumerate(surfaces):
-        if not len(mesh.faces):
-            continue
-        progress.tell(number / len(surfaces), "trees and normals")
-        Locator.of(mesh)
-        mesh.normals_at(mesh.faces[0])
-        progress.tell((number + 0.5) / len(surfaces), "depths")
-        with contextlib.suppress(InvalidInput):
-            if not bends:
-                DistanceField.of(mesh, resolution=RESOLUTION)
 
 
 def body_terms(desk: Desk, *, rigid: bool = True) -> tuple[PoseTerm, ...]:

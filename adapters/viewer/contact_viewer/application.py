@@ -109,6 +109,7 @@ class Application(TreeActions, FileActions):
         names = files.add_files(self.session, sources)
         self.say(f"{', '.join(names)} stands beside the rest now.")
         self.see_all()
+        self.interaction.prepare()
 
     def _take(self, session: Session) -> None:
         meters = 1.0

@@ -17,6 +17,7 @@ from contact_core.document.schema import document_to_json
 from contact_core.errors import CommandRejected, ContactError, InvalidInput
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.raycast import Locator
+from contact_core.grasping import filled
 from contact_core.interaction.events import Key, Pointer
 from contact_core.interaction.live import KeptContacts
 from contact_core.interaction.view import Perspective, View, on_plane, world_per_pixel
@@ -222,6 +223,29 @@ def test_what_is_prepared_is_not_built_again() -> None:
     builds = Locator.builds
     Locator.of(fresh)
     assert Locator.builds == builds and fresh in DistanceField._of_mesh
+
+
+def test_the_first_live_step_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The field of what is solid, its hollows filled, and trees: all stands there before anything is dragged."""
+    built: list[str] = []
+
+    def counting(module: Any, name: str) -> None:
+        real = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given: (built.append(name), real(*given))[1])
+
+    counting(filled, "filled")
+    counting(DistanceField, "_made")
+    artist = paired()
+    DistanceField._of_mesh.pop(artist.session.geometry.mesh("ball"), None)
+    artist.hands.prepare()
+    solved(artist)
+    assert sorted(built) == ["_made", "filled"]
+    trees = Locator.builds
+    start = artist.pixel("ball", artist.session.geometry.root("copy").point())[0]
+    artist.key("G")
+    artist.drag(start, start + 5.0)
+    assert "hand" in artist.session.document.poses, artist.hands.status
+    assert len(built) == 2 and Locator.builds == trees
 
 
 def test_a_proposal_for_another_document_is_refused_in_words() -> None:
