@@ -57,7 +57,39 @@ class SurfaceActor:
         self._points: Any = None
         self._normals: Normals
         self.color: Color = (0.7, 0.7, 0.7)
+        self._place: FloatArray = np.eye(4)
+        self._visible, self._veiled = True, False
         renderer.AddActor(self._actor)
+
+    @property
+    def prop(self) -> Any:
+        """What a renderer draws of it."""
+        return self._actor
+
+    @property
+    def state(self) -> object:
+        """Something that is equal for as long as it looks the same from one place."""
+        look, mapper = self._actor.GetProperty(), self._mapper
+        table = mapper.GetLookupTable() if mapper.GetScalarVisibility() else None
+        smooth = mapper.GetInterpolateScalarsBeforeMapping()
+        return (
+            self._polygons.data.GetMTime(),
+            look.GetMTime(),
+            table,
+            smooth,
+            self._place.tobytes(),
+            self._visible,
+        )
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether it is seen, and nothing through it."""
+        return self._visible and self._actor.GetProperty().GetOpacity() >= 1.0
+
+    def veil(self, veiled: bool) -> None:
+        """Whether something else shows it for now."""
+        self._veiled = veiled
+        self._actor.SetVisibility(self._visible and not veiled)
 
     def set_shape(self, points: FloatArray, faces: IntArray) -> None:
         """Points (n, 3) and faces (m, 3), surface space; the very same arrays as before cost nothing."""
@@ -71,7 +103,9 @@ class SurfaceActor:
 
     def set_place(self, world_from_surface: FloatArray) -> None:
         """Where it stands (4, 4)."""
-        self._actor.SetUserMatrix(_matrix(world_from_surface))
+        if not np.array_equal(world_from_surface, self._place):
+            self._place = np.array(world_from_surface, float)
+            self._actor.SetUserMatrix(_matrix(self._place))
 
     def set_look(self, color: Color, *, opacity: float = 1.0, visible: bool = True) -> None:
         """Its colour, and how much of what is behind shows through."""
@@ -80,7 +114,8 @@ class SurfaceActor:
         look.SetColor(*color)
         look.SetOpacity(opacity)
         look.SetBackfaceCulling(opacity < 1.0)  # one layer of a ghost: nothing has to be sorted
-        self._actor.SetVisibility(visible)
+        self._visible = visible
+        self.veil(self._veiled)
 
     def set_values(self, values: FloatArray | None, table: Any = None) -> None:
         """Colour each point by a number (n,) and a vtkLookupTable; None: its one colour again."""

@@ -2,7 +2,8 @@
 
 Everything is overwritten in place, and one `render` shows it. The cost in software OpenGL lies in pixels, lights
 and samples (measured: an empty frame 9 ms, a hand 2.5, 69k faces 17; eight samples three times all of it), so there
-are two lights, and edges are smoothed only in the frame that stands still.
+are two lights, and edges are smoothed only in the frame that stands still. While things move, surfaces that do not
+are an image (`standing`).
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from contact_viewer.actors import (
 from contact_viewer.eye import Eye
 from contact_viewer.gl import is_software
 from contact_viewer.look import DARK, Theme
+from contact_viewer.standing import Standing
 
 GHOST = 0.32  # opacity of a surface that one looks through
 _LIGHTS = (((-0.45, 0.7, 0.9), 0.82), ((0.6, -0.2, 0.8), 0.40))
@@ -74,6 +76,11 @@ class Canvas:
         self._base.SetAutomaticLightCreation(False)
         self._base.SetGradientBackground(True)
         _light(self._base)
+        for layer in (self._base, self._above):
+            if hasattr(layer, "SetUseOIT"):  # four passes over all pixels, for an order that there is anyway
+                layer.SetUseOIT(False)
+        self._base.GetCullers().RemoveAllItems()
+        self._standing = Standing(window, self._base)
         self.eye = Eye(self._base, up=up)
         self.eye.viewport = self._size = tuple(window.GetSize())
         self._surfaces: dict[str, SurfaceActor] = {}
@@ -209,8 +216,11 @@ class Canvas:
         self._sharpen(smooth=still or self._software is False)
         self._set_detail(self._quick_detail() if quick else 1.0)
         for pane in filter(None, (self, self.beside)):
-            pane.eye.clip()
             pane._words.place(pane.eye, self._detail or 1.0)
+            if quick and self._software and pane.share[0] < pane.share[1]:
+                pane._standing.use(pane._surfaces)
+            else:
+                pane._standing.leave(pane._surfaces)
         start = time.perf_counter()
         self.window.Render()
         if self._software is None:  # a window knows once it has drawn
@@ -263,6 +273,8 @@ class Canvas:
         """How much of width and height is drawn, so that a frame takes about as long as one may."""
         if self._seconds is None or not self._software:
             return 1.0
+        if self._standing.is_used and self._seconds * self._detail**2 < 2.0 * _FRAME:
+            return self._detail  # another size would cost a new image of what stands
         wanted = (_FRAME / max(self._seconds, 1e-6)) ** 0.5
         return next((step for step in _DETAILS if step <= wanted), _DETAILS[-1])
 

@@ -172,10 +172,6 @@ class Eye:
         focus = middle @ axes
         self._place(focus - max(float(reach.max()), 1e-6) * self.direction, focus)
 
-    def clip(self) -> None:
-        """Set the range of depths that are drawn; whoever draws calls it, after things and camera moved."""
-        self._renderer.ResetCameraClippingRange()
-
     def _axes(self) -> tuple[FloatArray, FloatArray]:
         """What points to the right and upwards on the screen, unit (3,) each."""
         ahead = self.direction
