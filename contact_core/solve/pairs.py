@@ -65,6 +65,16 @@ def pairs_of(problem: PoseProblem) -> Pairs:
 def _tracks(
     problem: PoseProblem, ends: Sequence[tuple[str, SurfacePoints]], *, as_object: bool
 ) -> tuple[Track, Track]:
+    """Points and normals of one end of all pairs; an end that is that of a problem before is taken over whole."""
+    key = as_object, tuple((name, id(points)) for name, points in ends)
+    if key not in problem.kept_ends:
+        problem.kept_ends[key] = (tuple(ends), *_made_tracks(problem, ends, as_object=as_object))
+    return problem.kept_ends[key][1:]
+
+
+def _made_tracks(
+    problem: PoseProblem, ends: Sequence[tuple[str, SurfacePoints]], *, as_object: bool
+) -> tuple[Track, Track]:
     """Points and normals of one end of all pairs; what lies on one body is blended in one go."""
     owner = np.repeat([problem.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
     order, tracks, normals = [], [], []
@@ -88,6 +98,9 @@ def _tracks(
 
 
 KeptTracks = MutableMapping[tuple[int, int], tuple[Rig, SurfacePoints, Track, Track]]
+KeptEnds = MutableMapping[
+    tuple[bool, tuple[tuple[str, int], ...]], tuple[tuple[tuple[str, SurfacePoints], ...], Track, Track]
+]  # by the bodies and the identities of the points, which are kept beside the tracks so that their ids stay theirs
 
 
 def _carried(rig: Rig, first: int, batches: Sequence[SurfacePoints], kept: KeptTracks) -> tuple[Track, Track]:

@@ -19,7 +19,7 @@ from contact_core.rig.skinning import Track
 from contact_core.solve.black_box import BlackBoxChart, BlackBoxMotion
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.extent import length_of
-from contact_core.solve.pairs import KeptTracks, Pairs, pairs_of
+from contact_core.solve.pairs import KeptEnds, KeptTracks, Pairs, pairs_of
 from contact_core.solve.state import PoseState
 from contact_core.solve.terms import BoundTerm, PoseTerm, paper_terms
 
@@ -266,6 +266,7 @@ class PoseProblem:
             del kept["prior_theta"]
         ends = {id(end) for each in contacts for end in (each.manipulator_points, each.object_points)}
         kept["kept_tracks"] = {key: made for key, made in self.kept_tracks.items() if key[0] in ends}
+        kept["kept_ends"] = {k: made for k, made in self.kept_ends.items() if all(end in ends for _, end in k[1])}
         bound = tuple((t, self.bound_terms[t.name]) for t in self.terms if not getattr(t, "reads_contacts", True))
         vars(result).update(kept, start=np.clip(theta, *self.limits_of_theta), _bound_before=bound)
         return result
@@ -374,6 +375,11 @@ class PoseProblem:
         return {}
 
     @cached_property
+    def kept_ends(self) -> KeptEnds:
+        """The same, of one end of all contacts."""
+        return {}
+
+    @cached_property
     def _still(self) -> dict[int, Motion | BlackBoxMotion]:
         """Motions of the bodies that do not move."""
         return {
@@ -439,6 +445,7 @@ _KEPT = (  # by problems that continue another: all that neither contacts nor th
     "charts", "is_rigid", "free_of_body", "dof_slices", "dof_names", "limits_of_theta", "is_translation", "is_root",
     "scale", "prior_weights", "_charted", "_leftovers", "prior_theta", "bone_offsets", "watched_offsets",
     "watched_dofs", "moves", "fields_of_body", "field_moves", "coupling", "_still", "_moved_bones", "kept_tracks",
+    "kept_ends",
 )  # fmt: skip
 
 

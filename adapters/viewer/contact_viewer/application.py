@@ -63,7 +63,7 @@ class Application(TreeActions, FileActions):
         self.guide = Guide(state_folder or state_directory())
         self._filmed = False
         self.film_open = False  # whether a timeline is shown, for which the film is measured
-        self._meets: list[panel.Residual] = []
+        self._meets: list[panel.Residual] | None = None  # until somebody asks
         self.shelves = Shelves(self, state_folder)
         self.open(list(sources))
         if not sources and self.guide.is_new and not self.session.document.patches:
@@ -351,7 +351,7 @@ class Application(TreeActions, FileActions):
             parts |= {"film"}
             self._filmed = False
         if {"document", "surfaces"} & parts:
-            self._meets = panel.residuals(self.session, self.interaction.desk.scene, self.interaction.desk.document)
+            self._meets = None
         if self._camera_moved:
             parts |= {"camera"}
         if self._told:
@@ -362,6 +362,8 @@ class Application(TreeActions, FileActions):
     @property
     def meets(self) -> list[panel.Residual]:
         """How well each pair meets in what is shown, the worst first."""
+        if self._meets is None:
+            self._meets = panel.residuals(self.session, self.interaction.desk.scene, self.interaction.desk.document)
         return self._meets
 
     def line(self) -> str:
@@ -375,7 +377,7 @@ class Application(TreeActions, FileActions):
     def tree(self) -> list[dict[str, Any]]:
         """The rows of the tree."""
         return panel.tree(
-            self.session, self.interaction, self._meets, self.drawer.hidden_surfaces, self.drawer.hidden_patches
+            self.session, self.interaction, self.meets, self.drawer.hidden_surfaces, self.drawer.hidden_patches
         )
 
     def table(self) -> tuple[Action, ...]:

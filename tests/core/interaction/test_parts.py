@@ -129,6 +129,18 @@ def test_a_continued_problem_keeps_what_did_not_change() -> None:
     assert kept.of(artist.session.document)[0] is after[0]
 
 
+def test_the_end_that_did_not_change_keeps_its_tracks() -> None:
+    artist = paired()
+    kept = KeptContacts(artist.session)
+    first = problem_of(artist.session.geometry, artist.session.rigs)
+    first = replace(first, contacts=kept.of(artist.session.document))
+    mine, theirs = first.pairs.manipulator_points, first.pairs.object_points
+    artist.session.patches.rotate("copy", 0.4)
+    again = first.continued(first.start, kept.of(artist.session.document), first.terms)
+    assert again.pairs.manipulator_points is mine and again.pairs.object_points is not theirs
+    assert len(again.kept_ends) == 2 and len(again.continued(again.start, (), ()).kept_ends) == 0
+
+
 def test_a_problem_goes_on_with_its_own_bodies_only() -> None:
     continued, anew = problems(paired())
     with pytest.raises(InvalidInput, match="same bodies"):

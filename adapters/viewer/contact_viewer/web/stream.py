@@ -122,6 +122,7 @@ class Stream:
                 drawn = await self._frame()
                 if not drawn and not self._sharp and not self._app.interaction.film.playback.is_playing:
                     await self._send(still=True)
+                    await self._drained()
                     self._sharp = True
             except Exception as error:  # one bad frame must not end the application; the document is whole
                 log.exception("a frame failed")
@@ -144,14 +145,17 @@ class Stream:
         for event in events:
             self._app.handle(event)
         parts = self._app.frame()
-        if parts:
-            self._changed(parts)
         redraw, self._resized = self._resized, False
-        if not (parts - {"work", "status"}) and not redraw:
-            return bool(events)
-        self._sharp = False
-        await self._send(still=False)
-        return True
+        drawn = redraw or bool(parts - {"work", "status"})
+        try:
+            if drawn:
+                self._sharp = False
+                await self._send(still=False)
+        finally:  # the image first: it is what the hand on the mouse waits for
+            if parts:
+                self._changed(parts)
+        await self._drained()
+        return drawn or bool(events)
 
     async def _send(self, *, still: bool) -> None:
         if self._streamer is None:
@@ -165,10 +169,11 @@ class Stream:
         meta = {"type": "image/jpeg", "codec": "", "w": width, "h": height, "st": int(time.time() * 1000),
                 "key": "key", "quality": quality}  # fmt: skip
         self._streamer.push_content(self.area_name, meta, content)
-        await self._drained()
 
     async def _drained(self) -> None:
         """Wait, not long, for the browser to take what was sent: else images pile up and all of them are late."""
+        if self._streamer is None:
+            return
         monitor = self._streamer.coreServer.network_monitor
         for _ in range(50):
             if monitor.pending <= 1:
