@@ -113,3 +113,22 @@ def test_what_comes_near_is_not_cut_off() -> None:
     canvas.surface("small").set_place(placed(-0.5, 3.5, 0.4))  # far before what was there
     quick(canvas, 2)
     assert np.mean(np.abs(quick(canvas) - canvas.image()).max(axis=2) > 2.0) < 2e-3
+
+
+def test_each_half_of_a_split_view_has_its_own() -> None:
+    canvas = scene()
+    other = canvas.beside = Canvas(canvas.window, sized=False)
+    for pane in (canvas, other):
+        for name in ("large", "small"):
+            pane.surface(name).set_shape(BALL.points, BALL.faces)
+    canvas.set_share(0.0, 0.5, SIZE)
+    other.set_share(0.5, 1.0, SIZE)
+    for pane in (canvas, other):
+        pane.eye.fit(2.0 * BALL.points)
+    before = quick(canvas, 4)
+    assert canvas._standing.is_used and other._standing.is_used
+    other.surface("small").set_place(placed(0.5, 1.0, 0.4))
+    over = quick(canvas)
+    changed = np.abs(over - before).max(axis=2) > 8.0
+    assert changed[:, SIZE[0] // 2 :].any() and not changed[:, : SIZE[0] // 2].any()
+    assert np.mean(np.abs(over - canvas.image()).max(axis=2) > 2.0) < 2e-3
