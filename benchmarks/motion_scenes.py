@@ -182,7 +182,7 @@ def sitting(seconds: float = 5.0, heels: float = 0.3, balance: float = 1.0) -> M
     frames = np.arange(round(seconds * RATE) + 1)
     problems = []
     for share in frames / frames[-1]:
-        gain = float(ease((share - 0.3) * 8.0) * (1.0 - ease((share - 0.6) * 8.0)))
+        gain = float(ease((share - 0.17) * 4.0) * (1.0 - ease((share - 0.58) * 4.0)))
         problems.append(replace(base, contacts=(*feet, *(replace(c, gain=gain) for c in others))))
     standing = {body.name: body.pose}
     return MotionProblem(

@@ -26,7 +26,7 @@ from contact_core.scene.picture import Picture, PictureMesh
 EXAMPLE = Path(__file__).parents[1] / "examples" / "15_repair_a_clip.py"
 CLIP, REPAIRED = "clip.contactscene", "repaired/clip.keyed.contactscene"
 FRAMES = range(0, 25, 4)
-OPACITY = 0.3
+FIRST = (0.45, 0.6, 0.9)  # the colour of the first frame, which goes over into that of skin
 
 
 def pictures(scene: Path, title: str) -> list[Picture]:
@@ -36,14 +36,22 @@ def pictures(scene: Path, title: str) -> list[Picture]:
     bodies = [each.mesh for picture in every for each in picture.meshes if each.color == SKIN]
     floor = [each for each in every[0].meshes if each.color == THING]
     points = bodies[0].points
+    share = np.linspace(0.0, 1.0, len(bodies))[:, None]
+    colors = (1.0 - share) * FIRST + share * SKIN
     low, size = points[:, 1].min(), np.ptp(points[:, 1])
     feet = points[points[:, 1] < low + 0.05 * size]
     reach = np.array([feet.min(axis=0), feet.max(axis=0)]) + size * np.array([[-0.02], [0.02]])
     drawn = replace(
-        every[0], points=(), meshes=(*floor, *(PictureMesh(body, SKIN, OPACITY) for body in bodies)),
+        every[0], points=(), meshes=(*floor, *(PictureMesh(body, tuple(each)) for body, each in zip(bodies, colors, strict=True))),
         camera_from=(0.3, 0.35, 1.0), focus=np.concatenate([points, points + 0.03]), caption=title,
     )  # fmt: skip
-    near = replace(drawn, focus=reach, camera_from=(0.3, 0.9, 1.0), caption=f"{title}, its feet")
+    near = replace(
+        drawn,
+        meshes=drawn.meshes[len(floor) :],
+        focus=reach,
+        camera_from=(0.3, 0.9, 1.0),
+        caption=f"{title}, its feet",
+    )
     return [drawn, near]
 
 
