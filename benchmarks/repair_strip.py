@@ -19,6 +19,7 @@ import numpy as np
 
 import contact_core as contact
 from contact_core.film.film import SKIN, THING, picture_at
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import RENDERERS
 from contact_core.scene.picture import Picture, PictureMesh
@@ -36,13 +37,11 @@ def pictures(scene: Path, title: str) -> list[Picture]:
     bodies = [each.mesh for picture in every for each in picture.meshes if each.color == SKIN]
     floor = [each for each in every[0].meshes if each.color == THING]
     points = bodies[0].points
-    share = np.linspace(0.0, 1.0, len(bodies))[:, None]
-    colors = (1.0 - share) * FIRST + share * SKIN
     low, size = points[:, 1].min(), np.ptp(points[:, 1])
     feet = points[points[:, 1] < low + 0.05 * size]
     reach = np.array([feet.min(axis=0), feet.max(axis=0)]) + size * np.array([[-0.02], [0.02]])
     drawn = replace(
-        every[0], points=(), meshes=(*floor, *(PictureMesh(body, tuple(each)) for body, each in zip(bodies, colors, strict=True))),
+        every[0], points=(), meshes=(*floor, *map(tinted, bodies, np.linspace(0.0, 1.0, len(bodies)))),
         camera_from=(0.3, 0.35, 1.0), focus=np.concatenate([points, points + 0.03]), caption=title,
     )  # fmt: skip
     near = replace(
@@ -53,6 +52,11 @@ def pictures(scene: Path, title: str) -> list[Picture]:
         caption=f"{title}, its feet",
     )
     return [drawn, near]
+
+
+def tinted(body: TriangleMesh, share: float) -> PictureMesh:
+    r, g, b = ((1.0 - share) * one + share * two for one, two in zip(FIRST, SKIN, strict=True))
+    return PictureMesh(body, (r, g, b))
 
 
 def run(folder: Path) -> None:
