@@ -22,6 +22,7 @@ from contact_core.document.document import ContactDocument, ContactPair, named
 from contact_core.edit.derived import Derived
 from contact_core.errors import CommandRejected, InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_map import SurfaceMap
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.geometry.transform import transform_points
@@ -131,6 +132,12 @@ class DocumentGeometry:
         """The same as it follows a posed mesh of the surface: the proxy posed, or that mesh itself."""
         found = self._derived.map(self.document, surface)
         return posed if found is None else found.followed(posed)
+
+    @property
+    def proxies(self) -> dict[str, SurfaceMap]:
+        """By name of a surface whose contacts run on a proxy: the map to it."""
+        maps = ((name, self._derived.map(self.document, name)) for name in self.document.surfaces)
+        return {name: found for name, found in maps if found is not None}
 
     def on_carrier(self, surface: str, points: SurfacePoints) -> SurfacePoints:
         """Points of a surface, checked, on the mesh that its contacts run on. Raises InvalidInput."""

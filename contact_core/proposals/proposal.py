@@ -159,12 +159,13 @@ def slide(
     unmoved = draft.document
     problem, options = _problem(draft, settings, "sliding"), settings.options_of(draft)
     patches, left_out = _sliding_patches(draft, problem, slack, turn, penalty)
-    slid = solve_sliding(settings.solver_of(plugins), problem, patches, options, settings.progress, settings.solids)
+    solver, proxies = settings.solver_of(plugins), draft.geometry.proxies
+    slid = solve_sliding(solver, problem, patches, options, settings.progress, settings.solids, proxies)
     _raise_if_cancelled(slid.solution)
     for contact, root in slid.roots.items():
         name = unmoved.pairs[contact].object
         if root != draft.geometry.root(name):
-            draft.patches.place(name, root.point(), heading=root.heading)
+            draft.patches.put(name, root)
     draft.take(slid.solution)
     command = change(start, draft.document, "Slide contacts")
     return Proposal(command, draft.document, revision, slid.fixed, slid.solution, left_out)
@@ -191,14 +192,12 @@ def _raise_if_cancelled(solution: PoseSolution) -> None:
         raise Cancelled("it was cancelled; nothing is proposed.")
 
 
-def _bends(draft: Draft, contact: str, *, sliding: bool = False) -> str:
+def _bends(draft: Draft, contact: str) -> str:
     """Why a contact cannot move on its object, empty where it can."""
     pair = draft.document.pairs[contact]
     surfaces = [draft.document.patch(end).surface for end in (pair.manipulator, pair.object)]
     if surfaces[1] in draft.rigs:
         return f"{surfaces[1]} bends, and contacts only move on surfaces that stay as they are"
-    if sliding and draft.document.surface(surfaces[1]).proxy is not None:
-        return f"the contacts of {surfaces[1]} run on a proxy, and only settling moves those"
     return "" if surfaces[0] in draft.rigs else f"{surfaces[0]} has no rig that is posed"
 
 
@@ -238,7 +237,7 @@ def _sliding_patches(
 ) -> tuple[list[SlidingPatch], dict[str, str]]:
     document, patches, left_out = draft.document, [], {}
     for contact, pair in document.pairs.items():
-        patch, reason = document.patch(pair.object), _bends(draft, contact, sliding=True)
+        patch, reason = document.patch(pair.object), _bends(draft, contact)
         if not reason and patch.shape != document.patch(pair.manipulator).shape:
             reason = "its two patches were painted apart, and share no shape"
         if reason:

@@ -7,13 +7,15 @@ stood before (`depth_bound`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from contact_core.contact.placement import Root
 from contact_core.errors import InvalidInput
+from contact_core.geometry.surface_map import SurfaceMap
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.depth_bound import DepthBound, measured
 from contact_core.proposals.sliding_targets import SlidingPatch, SlidingTargets
@@ -24,6 +26,7 @@ from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, So
 
 SLIDING = ".sliding"  # what the body of the sliding patches of a surface is called: its name and this
 ITERATIONS = 20  # at most in a round: the pose is nearly there, and what comes later gains a few hundredths
+NO_PROXIES: Mapping[str, SurfaceMap] = MappingProxyType({})
 ROUNDS = 5  # of solving and moving the walls; two are usual
 
 
@@ -37,9 +40,12 @@ class SlidSolution:
     roots: dict[str, Root]
 
 
-def sliding_problem(problem: PoseProblem, patches: Sequence[SlidingPatch]) -> PoseProblem:
+def sliding_problem(
+    problem: PoseProblem, patches: Sequence[SlidingPatch], proxies: Mapping[str, SurfaceMap] = NO_PROXIES
+) -> PoseProblem:
     """The problem in which the named contacts meet sliding targets instead of fixed points.
 
+    proxies: by surface, the map to the proxy that its patches run on: roots are then on the proxy.
     Raises InvalidInput for a contact that is not there, or one on what moves or bends.
     """
     contacts = {contact.name: contact for contact in problem.contacts}
@@ -53,7 +59,7 @@ def sliding_problem(problem: PoseProblem, patches: Sequence[SlidingPatch]) -> Po
             by_surface.setdefault(contact.object, []).append(name)
     bodies, free = list(problem.bodies), dict(problem.free or {})
     for surface, names in by_surface.items():
-        targets = _targets(problem, surface, [wanted[name] for name in names])
+        targets = _targets(problem, surface, [wanted[name] for name in names], proxies.get(surface))
         bodies.append(Body.evaluated(surface + SLIDING, targets))
         free[surface + SLIDING] = [dof.name for dof in targets.dofs]
         contacts |= {name: replace(contacts[name], object=surface + SLIDING) for name in names}
@@ -66,14 +72,17 @@ def sliding_problem(problem: PoseProblem, patches: Sequence[SlidingPatch]) -> Po
     )
 
 
-def _targets(problem: PoseProblem, surface: str, patches: Sequence[SlidingPatch]) -> SlidingTargets:
+def _targets(
+    problem: PoseProblem, surface: str, patches: Sequence[SlidingPatch], seen: SurfaceMap | None
+) -> SlidingTargets:
     index = problem.body_index(surface)
     owner = problem.bodies[index]
     if len(owner.rig.joints) > 1 or len(problem.free_of_body[index]):
         raise InvalidInput(f"{surface!r} moves or bends; contacts slide on bodies that stay.")
     world = problem.start_state.world[int(problem.bone_offsets[index])] @ np.linalg.inv(owner.rig.bind_world[0])
     meant = {contact.name: contact.object_points for contact in problem.contacts}
-    return SlidingTargets(owner.rig.surface, patches, world, [meant[patch.contact] for patch in patches])
+    walked = owner.rig.surface if seen is None else seen.proxy
+    return SlidingTargets(walked, patches, world, [meant[patch.contact] for patch in patches], seen)
 
 
 def solve_sliding(
@@ -83,15 +92,17 @@ def solve_sliding(
     options: SolveOptions | None = None,
     progress: Progress = NO_PROGRESS,
     solids: Solids | None = None,
+    proxies: Mapping[str, SurfaceMap] = NO_PROXIES,
 ) -> SlidSolution:
     """Solve the pose with fixed targets first, then pose and slides together from there, no deeper than there.
 
     options: of the first solve, and of the second from where that ended. solids: closed meshes by body that skin
     stays out of; by default the surfaces of rigid bodies. The deepest skin vertex is then no deeper than before,
-    and no more of the skin's area is inside; where no slide keeps to that, nothing slides.
+    and no more of the skin's area is inside; where no slide keeps to that, nothing slides. proxies: see
+    `sliding_problem`.
     """
     fixed = solver.solve(problem, options, progress.part(0.0, 0.5, "before sliding"))
-    together = sliding_problem(problem.at(fixed.theta), patches)
+    together = sliding_problem(problem.at(fixed.theta), patches, proxies)
     options = options or SolveOptions()
     settings = replace(options, max_iterations=min(options.max_iterations, ITERATIONS), candidates=("current",))
     if fixed.status is SolveStatus.CANCELLED:

@@ -20,6 +20,7 @@ from contact_core.contact.shape import AxisShape, PatchShape
 from contact_core.contact.tracer import PatchTracer, ShapedPatch, TracedPatches
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.surface_map import SurfaceMap
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import heading_to_direction
 from contact_core.geometry.tracing import trace_geodesic
@@ -60,7 +61,8 @@ class SlidingTargets:
     """The sliding patches of one surface as a black-box body. theta: per patch, the root offset along and across
     the first heading, then the turn, each as a share of its slack, so that one penalty and one step fit all.
 
-    meant: their points at theta 0. Raises InvalidInput for a patch whose points are others.
+    surface: what they walk on. seen: where that is a proxy, the map to the mesh that their points are given on.
+    meant: those points at theta 0. Raises InvalidInput for a patch whose points are others.
     """
 
     world_length = 0.0  # a target is not what distances are judged against
@@ -71,8 +73,10 @@ class SlidingTargets:
         patches: Sequence[SlidingPatch],
         world_from_surface: FloatArray,
         meant: Sequence[SurfacePoints],
+        seen: SurfaceMap | None = None,
     ) -> None:
         self.surface, self.patches, self.world = surface, tuple(patches), np.asarray(world_from_surface, float)
+        self.seen, self.mesh = seen, surface if seen is None else seen.source
         self.dofs = [BlackBoxDof(name, -1.0, 1.0, patch.penalty) for patch in patches for name in patch.dof_names]
         self.tracer = PatchTracer(surface, [ShapedPatch(patch.shape, patch.axis) for patch in patches])
         self._starts = SurfacePoints.concatenate(patch.root.point() for patch in patches)
@@ -82,10 +86,10 @@ class SlidingTargets:
         self._check(meant)
 
     def _check(self, meant: Sequence[SurfacePoints]) -> None:
-        found, owner = self.placed(np.zeros(len(self.dofs))).points, self.tracer.patch_of_point
-        near = 1e-6 * self.surface.bounding_box_diagonal
+        found, owner = self.points(np.zeros(len(self.dofs))), self.tracer.patch_of_point
+        near = 1e-6 * self.mesh.bounding_box_diagonal
         for i, (patch, points) in enumerate(zip(self.patches, meant, strict=True)):
-            own, wanted = found[owner == i].positions(self.surface), points.positions(self.surface)
+            own, wanted = found[owner == i].positions(self.mesh), points.positions(self.mesh)
             if own.shape != wanted.shape or np.linalg.norm(own - wanted, axis=1).max(initial=0.0) > near:
                 raise InvalidInput(f"the object points of {patch.contact!r} are not its patch at the given root.")
 
@@ -134,6 +138,11 @@ class SlidingTargets:
             self._last = key, self.tracer.trace(*self.where(theta))
         return self._last[1]
 
+    def points(self, theta: FloatArray) -> SurfacePoints:
+        """The patches' points at theta on the mesh that is seen (`mesh`)."""
+        walked = self.placed(theta).points
+        return walked if self.seen is None else self.seen.to_source(walked)
+
     def watch(self, points: SurfacePoints) -> Evaluate:
         """The patches' own points, all of them; `points` are they at theta 0."""
         return _Slide(self)
@@ -144,7 +153,8 @@ class _Slide:
 
     A path of straight legs crosses a strip of faces that unfolds into the plane. So when the root moves by a small
     vector, each point moves by the same vector, carried along its path; and when the root turns, each point turns
-    about it in the plane. Paths that meet a vertex have no derivative, and there this is that of one side.
+    about it in the plane. Paths that meet a vertex have no derivative, and there this is that of one side. On a
+    proxy what moves on the mesh is the foot of the moving point: its share along the foot's face or edge.
     """
 
     def __init__(self, targets: SlidingTargets) -> None:
@@ -154,10 +164,10 @@ class _Slide:
         self.unfolded, self.ends = (np.concatenate([pair[i] for pair in unfolded]) for i in range(2))
 
     def __call__(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        placed = self.targets.placed(theta).points
-        normals = placed.normals(self.surface) @ self.linear.T
+        points, mesh = self.targets.points(theta), self.targets.mesh
+        normals = points.normals(mesh) @ self.linear.T
         length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return placed.positions(self.surface) @ self.linear.T + self.targets.world[:3, 3], normals / length
+        return points.positions(mesh) @ self.linear.T + self.targets.world[:3, 3], normals / length
 
     def derivatives(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(d, k, 3) of points and of normals; 0 where a dof is of another patch."""
@@ -169,7 +179,10 @@ class _Slide:
         plane = np.stack([along, 1j * along, 1j * targets.turns[owner] * self.unfolded])  # (3, k)
         ahead, aside = (heading_to_direction(self.surface, placed.points, turn * carried) for turn in (1.0, 1j))
         moved = plane.real[..., None] * ahead + plane.imag[..., None] * aside  # (3, k, 3)
-        return self._spread(moved @ self.linear.T), self._spread(self._normals_moved(placed.points, moved))
+        points = targets.points(theta)
+        if targets.seen is not None:
+            moved = _of_feet(targets.mesh, points, moved)
+        return self._spread(moved @ self.linear.T), self._spread(self._normals_moved(points, moved))
 
     def _spread(self, own: FloatArray) -> FloatArray:
         """(d, k, 3) out of (3, k, 3), the derivatives by each point's own patch."""
@@ -181,7 +194,7 @@ class _Slide:
 
     def _normals_moved(self, points: SurfacePoints, moved: FloatArray) -> FloatArray:
         """(d, k, 3) derivative of the world normals where the points move by `moved` within their faces."""
-        mesh = self.surface
+        mesh = self.targets.mesh
         corners = mesh.faces[points.faces]  # (k, 3)
         position = mesh.points[corners]  # (k, 3, 3)
         opposite = np.roll(position, -2, axis=1) - np.roll(position, -1, axis=1)
@@ -194,6 +207,22 @@ class _Slide:
         unit = blended / length
         change = change - np.einsum("qki,ki->qk", change, unit)[..., None] * unit
         return np.asarray(change / length)
+
+
+def _of_feet(mesh: TriangleMesh, feet: SurfacePoints, moved: FloatArray) -> FloatArray:
+    """(d, k, 3) how the feet (k) on a mesh of points that move by (d, k, 3) move: along the face, along the edge if
+    the foot lies on one, not at all at a vertex."""
+    corners = mesh.points[mesh.faces[feet.faces]]  # (k, 3, 3)
+    off = feet.barycentric <= 1e-12  # (k, 3)
+    normal = mesh.face_normals[feet.faces]
+    inside = moved - np.einsum("qki,ki->qk", moved, normal)[..., None] * normal
+    lone = off.argmax(axis=1)  # the corner opposite to the edge
+    rows = np.arange(len(lone))
+    edge = corners[rows, (lone + 2) % 3] - corners[rows, (lone + 1) % 3]
+    edge /= np.maximum(np.linalg.norm(edge, axis=1, keepdims=True), 1e-300)
+    along = np.einsum("qki,ki->qk", moved, edge)[..., None] * edge
+    sides = off.sum(axis=1)[:, None]
+    return np.where(sides == 0, inside, np.where(sides == 1, along, 0.0))
 
 
 def _unfold(patch: SlidingPatch) -> tuple[ComplexArray, ComplexArray]:

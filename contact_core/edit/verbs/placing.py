@@ -48,6 +48,11 @@ class PlacingVerbs(VerbGroup):
 
         self._mended([surface], act)
 
+    def put(self, patch: str, root: Root) -> None:
+        """Move a patch to a root as `geometry.root` gives it: on the mesh that contacts run on (`carrier_of`)."""
+        self._geometry.check_points(self._document.patch(patch).surface, root.point(), on_carrier=True)
+        self._do_where_it_can_walk(Translate(patch, self._placement_at(patch, root)), [patch])
+
     def _do_where_it_can_walk(self, command: Command, patches: Iterable[str]) -> None:
         """Do what places patches; on a surface that is broken somewhere they are traced first.
 

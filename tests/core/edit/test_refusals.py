@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +102,8 @@ CASES: list[tuple[str, Callable[[Session], object]]] = [
     ("patches.place", lambda s: s.patches.place("palm", HERE, direction=[1.0, 2.0])),
     ("patches.place", lambda s: s.patches.place("palm", HERE, direction=[NAN] * 3)),
     ("patches.place", lambda s: s.patches.place("palm", NOWHERE, heading=1.0)),
+    ("patches.put", lambda s: s.patches.put("nobody", s.geometry.root("palm"))),
+    ("patches.put", lambda s: s.patches.put("palm", replace(s.geometry.root("palm"), face=10**6))),
     ("patches.rotate", lambda s: s.patches.rotate("palm", NAN)),
     ("patches.rotate", lambda s: s.patches.rotate("palm", 0.1, about=10**6)),
     ("patches.rotate", lambda s: s.patches.rotate("palm", 0.1, about=-1)),
