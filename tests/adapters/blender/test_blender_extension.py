@@ -299,10 +299,6 @@ class Layout:
 
         return Given()
 
-    def operator_menu_enum(self, name: str, choice: str, icon: str = "NONE") -> None:
-        self.known(icon)
-        assert choice in getattr(self.bpy.ops.contact, name.removeprefix("contact.")).get_rna_type().properties
-
 
 def drawn(bpy: Any) -> list[str]:
     """The texts of the panels as they are now."""
