@@ -26,6 +26,7 @@ def test_a_walk_by_keys(window: Window) -> Iterator[Any]:
 
     for each in tuple(bpy.data.objects):
         bpy.data.objects.remove(each)
+    bpy.data.orphans_purge(do_recursive=True)  # a file that is saved forgets what nobody uses
     rig = rehearsal.finger()
     shared.session().host.add(contact.Asset("arm", rig.surface, rig=rig, meters_per_unit=1.0, up_axis="Z"))
     skin = next(each for each in bpy.data.objects if each.type == "MESH")
