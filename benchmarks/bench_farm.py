@@ -1,10 +1,11 @@
 """The farm: what it costs beside the work, on 1 and 2 workers; what a second run costs; workers that are killed.
 
-    python -m benchmarks.bench_farm [--quick] [--shots N]
+    python -m benchmarks.bench_farm [--quick] [--shots N] [--usd]
 
 Shots are small documents: a finger on a ball, a tenth of a second of work each, most of it the picture, so that
-what the farm adds is seen. The kernels are compiled before. What the farm adds is told in CPU seconds of all
-processes: those of a whole batch, without the start of its workers, less those of the jobs themselves.
+what the farm adds is seen; with --usd, small stages of an arm and a ball, each with its contact layer. The kernels
+are compiled before. What the farm adds is told in CPU seconds of all processes: those of a whole batch, without the
+start of its workers, less those of the jobs themselves.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="60 shots")
     parser.add_argument("--shots", type=int, help=f"how many ({SHOTS})")
+    parser.add_argument("--usd", action="store_true", help="USD shots in place of documents")
     parser.add_argument("--waiting", action="store_true", help="only jobs that wait: how they spread over workers")
     arguments, _ = parser.parse_known_args()
     if arguments.waiting:
@@ -52,19 +54,19 @@ def main() -> None:
     warm_up()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_shots(folder / "shots", count)
+        (write_usd_shots if arguments.usd else write_shots)(folder / "shots", count)
         rows: dict[str, str] = {"shots": str(count)}
-        runs: dict[int, Run] = {0: timed(folder, 1, "shot0000.json")}
+        runs: dict[int, Run] = {0: timed(folder, 1, "shot0000.contact.usda" if arguments.usd else "shot0000.json")}
         start = runs[0].spent - runs[0].work
         for workers in (1, 2):
             runs[workers] = timed(folder, workers)
             rows[f"{workers} worker{'s' * (workers > 1)}"] = runs[workers].spelled(start * workers)
         rows["start of a worker"] = f"{start:.1f} s of CPU, once"
         rows["2 workers against 1"] = f"{runs[1].batch.seconds / runs[2].batch.seconds:.2f} times as fast"
-        again = run_batch([folder / "shots" / "*.json"], folder / "out 1 6")
+        again = run_batch([folder / "shots"], folder / "out 1 0")
         rows["again, nothing has changed"] = f"{again.seconds:.2f} s, {1e3 * again.seconds / count:.2f} ms a shot"
         rows[f"killed at random {KILLS} times"] = killed(folder)
-    record("Farm", rows)
+    record("Farm: USD shots" if arguments.usd else "Farm", rows)
 
 
 def write_shots(folder: Path, count: int) -> None:
@@ -110,7 +112,49 @@ class Run:
         )
 
 
-def timed(folder: Path, workers: int, shots: str = "*.json") -> Run:
+def write_usd_shots(folder: Path, count: int) -> None:
+    """An asset layer, and for each shot a layer in which the ball stands elsewhere, and its contacts over it."""
+    from pxr import Gf, Sdf, Usd, UsdGeom
+
+    from contact_core.testing.host_scenes import arm_rig
+    from contact_usd.host import UsdHost
+
+    folder.mkdir()
+    rig, ball, made, place = arm_rig(), meshes.icosphere(2), UsdHost(), np.eye(4)
+    place[:3, 3] = (1.2, 3.0, 0.0)
+    made.add(contact.Asset("arm", rig.surface, rig, meters_per_unit=1.0))
+    made.add(contact.Asset("ball", ball.with_points(0.5 * ball.points), meters_per_unit=1.0), place)
+    made.layer.customLayerData = {}  # an asset like any other
+    made.save(folder / "asset.usda")
+    host = UsdHost(folder / "asset.usda")
+    with contact.Session(host=host, discover=False) as session:
+        for item in host.objects():
+            asset = host.read_rig(item.id) if item.kind == "rig" else host.read_surface(item.id)
+            where = host.placement(item.id)
+            session.surfaces.add(item.name, asset.mesh, rig=asset.rig, world_from_surface=where)
+        skin, thing = session.geometry.mesh("arm"), session.geometry.mesh("ball")
+        near = np.argsort(np.linalg.norm(skin.points - [0.3, 2.8, 0.0], axis=1), kind="stable")[:6]
+        points = contact.SurfacePoints.at_vertices(skin, near)
+        session.patches.paint("tip", points, surface="arm", axis=points[[0, 3]])
+        root = contact.SurfacePoints.at_vertices(thing, [int(np.argmin(thing.points[:, 0]))])
+        session.pairs.add("tip", session.patches.transfer("tip", "ball", root, heading=1.0 + 0.0j))
+        host.save(folder / "contacts.usda")
+    contacts = (folder / "contacts.usda").read_text(encoding="utf-8")
+    (folder / "contacts.usda").unlink()
+    for number in range(count):
+        name = f"shot{number:04d}"
+        layer = Sdf.Layer.CreateNew(str(folder / f"{name}.usda"))
+        layer.subLayerPaths = ["./asset.usda"]
+        stage = Usd.Stage.Open(layer)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        move = UsdGeom.Xformable(stage.GetPrimAtPath("/ball")).GetOrderedXformOps()[0]
+        move.Set(Gf.Matrix4d(1.0).SetTranslate((1.2, 3.0 + 0.4 * number / count, 0.0)))
+        layer.Save()
+        over = contacts.replace("./asset.usda", f"./{name}.usda")
+        (folder / f"{name}.contact.usda").write_text(over, encoding="utf-8")
+
+
+def timed(folder: Path, workers: int, shots: str = "") -> Run:
     """Shots on so many workers, into a folder of their own."""
     before = sum(os.times()[:4])
     batch = run_batch(
@@ -140,7 +184,7 @@ def killed(folder: Path) -> str:
     over.set()
     killer.join()
     lost = sum(
-        results_of(folder / "out 1 6", r.name) != results_of(folder / "out killed", r.name) for r in result.results
+        results_of(folder / "out 1 0", r.name) != results_of(folder / "out killed", r.name) for r in result.results
     )
     return (
         f"{count} kills, {lost} of {len(result.results)} results lost or other, {time.perf_counter() - began:.1f} s"
