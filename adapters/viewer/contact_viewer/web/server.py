@@ -305,7 +305,10 @@ class WebApplication:
             self._show_shelves()
         if app.help_wanted != self._help_told:  # else a dialog that is just being closed would open again
             told["help_wanted"] = self._help_told = app.help_wanted
-        if app.wants is not None:
+        if app.wants == "library":
+            told |= {"library_wanted": not state.library_wanted, "shelves": app.shelves.rows()}
+            app.wants = None
+        elif app.wants is not None:
             told[f"{app.wants}_wanted"], app.wants = True, None
         if everything or pending & {"document", "selection", "status", "camera"}:
             told["card"] = app.guide.card()
