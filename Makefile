@@ -42,7 +42,7 @@ typecheck: $(READY)
 	$(BIN)/mypy
 
 pytest: $(READY)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -q
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -q
 
 # 500 processes that edit and save killed at random, 20 workers of a batch, 1000 damages of each stored format; each reader
 # FUZZ seconds long given files that were spoilt at random; then the laws on examples that nobody drew before, ROUNDS times over.

@@ -369,7 +369,7 @@ def test_what_is_solved_for_is_the_mesh_that_is_seen_and_slides_on_the_proxy() -
         goal = problem.contacts[0].object_points
         assert goal.same_as(session.geometry.points("goal")) and goal.faces.max() < len(mesh.faces)
         session.accept(slid := session.slide())
-        assert not slid.left_out and slid.document.surface("thing").proxy is not None
+        assert not slid.left_out and session.document.surface("thing").proxy is not None
         assert session.problem().contacts[0].object_points.same_as(session.geometry.points("goal"))
 
 

@@ -79,5 +79,5 @@ def test_every_built_in_solver_and_term_is_judged() -> None:
     manager = PluginManager([contact_builtins], discover=False)
     assert set(manager.offers(POSE_SOLVERS)) == set(JUDGED)
     assert set(manager.offers(POSE_TERMS)) == {
-        "distance", "normal", "prior", "penetration", "self-collision", "pin", "look",
+        "distance", "normal", "prior", "penetration", "self-collision", "pin", "look", "balance",
     }  # fmt: skip
