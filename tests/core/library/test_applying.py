@@ -126,7 +126,11 @@ def test_the_other_hand_does_the_mirror_image(held: Session, saved: Saved) -> No
     assert np.allclose(flip @ rig.rest_local @ flip, scene.rig.rest_local)
 
 
-@pytest.mark.parametrize(("hand", "thing"), [("human_hand", "mug"), ("witch_hand", "baseball")])
+# Not the human hand on the mug: it closes round it by 98 to 101 degrees where 100 are wanted, which falls to either
+# side by the last bits of one processor or another.
+@pytest.mark.parametrize(
+    ("hand", "thing"), [("human_hand", "pole"), ("witch_hand", "baseball"), ("witch_hand", "mug")]
+)
 def test_it_holds_elsewhere(saved: Saved, plugins: PluginManager, hand: str, thing: str) -> None:
     session = fresh(plugins, hand, thing)
     (found,) = apply(library_scene(session, HAND, OBJECT), *saved)
