@@ -135,9 +135,9 @@ def sphere() -> dict[str, Any]:
     }
 
 
-def sitting_down() -> tuple[dict[str, Any], MotionSolution]:
-    """The body sits down and stands up."""
-    motion = sitting()
+def sitting_down(leaning: bool = False) -> tuple[dict[str, Any], MotionSolution]:
+    """The body sits down and stands up, its back upright or leaning forward to keep its balance."""
+    motion, title = sitting(leaning=leaning), "sitting, leaning" if leaning else "sitting"
     solution, ms = timed(motion)
     report = motion_report(motion, solution.thetas)
     problem = motion.problems[0]
@@ -149,12 +149,12 @@ def sitting_down() -> tuple[dict[str, Any], MotionSolution]:
     feet = [pair for name, pair in report.pairs.items() if name.startswith("foot")]
     seat = [pair for name, pair in report.pairs.items() if name.startswith("seat")]
     return {
-        "sitting: skate of the feet max, mm/frame (<= 0.15)": MM * max(pair.skate_max for pair in feet) / RATE,
-        "sitting: hips' largest step, mm (<= 30)": MM
+        f"{title}: skate of the feet max, mm/frame (<= 0.15)": MM * max(pair.skate_max for pair in feet) / RATE,
+        f"{title}: hips' largest step, mm (<= 30)": MM
         * float(np.linalg.norm(np.diff(places, axis=0), axis=1).max()),
-        "sitting: seat error, % of the body (<= 1)": 100.0 * float(np.mean([pair.mean for pair in seat])) / size,
-        "sitting: penetration held, % of the body (<= 1)": 100.0 * report.penetration_held / size,
-        f"sitting: ms a frame, d = {motion.pinned.shape[1]}": ms,
+        f"{title}: seat error, % of the body (<= 1)": 100.0 * float(np.mean([pair.mean for pair in seat])) / size,
+        f"{title}: penetration held, % of the body (<= 1)": 100.0 * report.penetration_held / size,
+        f"{title}: ms a frame, d = {motion.pinned.shape[1]}": ms,
     }, solution
 
 
@@ -229,5 +229,5 @@ if __name__ == "__main__":
     rows |= lengths((30, 60) if quick else (30, 60, 120, 240, 480))
     if not quick:
         seated, truth = sitting_down()
-        rows |= seated | repairing(truth)
+        rows |= seated | sitting_down(leaning=True)[0] | repairing(truth)
     record("motion", rows)

@@ -162,11 +162,12 @@ def growing(frames: int = 73) -> MotionProblem:
     return MotionProblem(tuple(map(float, range(frames))), tuple(problems), RATE)
 
 
-def sitting(seconds: float = 5.0, heels: float = 0.3, balance: float = 1.0) -> MotionProblem:
+def sitting(seconds: float = 5.0, heels: float = 0.3, leaning: bool = False) -> MotionProblem:
     """The body stands, sits down with its hands on its thighs, and stands up again; its feet are held throughout.
 
-    The soles stand where they are at rest; the chair comes under the body. Its centre of mass stays above what
-    bears: it leans forward on the way, and comes upright where the seat has taken over.
+    The soles stand where they are at rest; the chair comes under the body. leaning: its centre of mass stays above
+    what bears (the term `balance`), so it leans forward on the way and comes upright where the seat has taken over;
+    without, it keeps its back upright, as nobody who is in balance can.
     """
     scene = chair().problem
     body = scene.bodies[0]
@@ -177,12 +178,13 @@ def sitting(seconds: float = 5.0, heels: float = 0.3, balance: float = 1.0) -> M
     scene = replace(scene, bodies=(body, *scene.bodies[1:]))
     feet = tuple(_in_place(contact, scene) for contact in scene.contacts if contact.name.startswith("foot"))
     others = tuple(contact for contact in scene.contacts if not contact.name.startswith("foot"))
-    terms = (*scene.terms, BalanceTerm(weight=balance))
+    terms = (*scene.terms, BalanceTerm()) if leaning else scene.terms
     base = replace(scene, contacts=(*feet, *others), terms=terms, length=scene.manipulator_length)
     frames = np.arange(round(seconds * RATE) + 1)
+    on, off, speed = (0.17, 0.58, 4.0) if leaning else (0.3, 0.6, 8.0)  # who leans swings the hips farther
     problems = []
     for share in frames / frames[-1]:
-        gain = float(ease((share - 0.17) * 4.0) * (1.0 - ease((share - 0.58) * 4.0)))
+        gain = float(ease((share - on) * speed) * (1.0 - ease((share - off) * speed)))
         problems.append(replace(base, contacts=(*feet, *(replace(c, gain=gain) for c in others))))
     standing = {body.name: body.pose}
     return MotionProblem(

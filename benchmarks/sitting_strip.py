@@ -39,7 +39,7 @@ def picture(solution: MotionSolution, row: int) -> Picture:
 
 
 if __name__ == "__main__":
-    solved = solve_motion(sitting())
+    solved = solve_motion(sitting(leaning=True))
     pictures = [picture(solved, row) for row in ROWS]
     everything = [item.mesh.points for each in pictures for item in each.meshes[:2]]  # not the floor
     focus = np.concatenate([np.stack([points.min(axis=0), points.max(axis=0)]) for points in everything])
