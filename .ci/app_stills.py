@@ -39,6 +39,16 @@ def taken(page: Page) -> Any:
     return Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
 
 
+def turn(page: Page, share: float) -> None:
+    """Turn the camera to the right by a share of the view's width."""
+    width, height = page.size()
+    left, top = page.corner()
+    page.page.mouse.move(left + 0.5 * width, top + 0.9 * height)
+    page.page.mouse.down(button="middle")
+    page.page.mouse.move(left + (0.5 + share) * width, top + 0.9 * height, steps=12)
+    page.page.mouse.up(button="middle")
+
+
 def stills(page: Page) -> Iterator[tuple[str, Any]]:
     """Names and pictures, of a page that a hand and a mug are open in."""
     page.page.locator("button[title^='Library']").click()

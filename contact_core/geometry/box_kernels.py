@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from contact_core.arrays import FloatArray, Int32Array, IntArray, SingleArray
-from contact_core.geometry.box_tree import Dipoles, Tree
+from contact_core.geometry.box_tree import Dipoles, Tree, corners_of, run_of
 from contact_core.geometry.jit import kernel
 
 STACK = 128  # the tree is balanced: its depth is log2 of the leaf count, and a stack holds one sibling a level
@@ -137,15 +137,10 @@ def _cast(
                     top += 1
                     stack[top] = near_child
                 continue
-            for t in range(
-                ((node - leaves + 1) * len(order)) >> levels, ((node - leaves + 2) * len(order)) >> levels
-            ):
+            first, last = run_of(node - leaves + 1, order, levels)
+            for t in range(first, last):
                 f = order[t]
-                a, b, c = (
-                    mesh_points[mesh_faces[f, 0]],
-                    mesh_points[mesh_faces[f, 1]],
-                    mesh_points[mesh_faces[f, 2]],
-                )
+                a, b, c = corners_of(mesh_points, mesh_faces, f)
                 az = a[kz] - origins[i, kz]
                 bz = b[kz] - origins[i, kz]
                 cz = c[kz] - origins[i, kz]
@@ -276,15 +271,10 @@ def _closest(
                     top += 1
                     stack[top] = near_child
                 continue
-            for t in range(
-                ((node - leaves + 1) * len(order)) >> levels, ((node - leaves + 2) * len(order)) >> levels
-            ):
+            first, last = run_of(node - leaves + 1, order, levels)
+            for t in range(first, last):
                 f = order[t]
-                a, b, c = (
-                    mesh_points[mesh_faces[f, 0]],
-                    mesh_points[mesh_faces[f, 1]],
-                    mesh_points[mesh_faces[f, 2]],
-                )
+                a, b, c = corners_of(mesh_points, mesh_faces, f)
                 if len(facing) and _looks_away(a, b, c, facing[i, 0], facing[i, 1], facing[i, 2], facing_limit):
                     continue
                 squared = _closest_on_triangle(a, b, c, x, y, z, out)
@@ -361,14 +351,9 @@ def _winding(
                 stack[top + 2] = 2 * node + 2
                 top += 2
             else:
-                for t in range(
-                    ((node - leaves + 1) * len(order)) >> levels, ((node - leaves + 2) * len(order)) >> levels
-                ):
+                first, last = run_of(node - leaves + 1, order, levels)
+                for t in range(first, last):
                     f = order[t]
-                    p, q, r = (
-                        mesh_points[mesh_faces[f, 0]],
-                        mesh_points[mesh_faces[f, 1]],
-                        mesh_points[mesh_faces[f, 2]],
-                    )
+                    p, q, r = corners_of(mesh_points, mesh_faces, f)
                     total += _solid_angle(p, q, r, x, y, z)
         result[i] = total / (4.0 * np.pi)

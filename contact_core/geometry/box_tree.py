@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contact_core.arrays import FloatArray, Int32Array, IntArray, SingleArray
-from contact_core.geometry.jit import kernel
+from contact_core.geometry.jit import inlined, kernel
 
 LEAF_SIZE = 4
 MARGIN = 2e-7  # of half the mesh's size: boxes are so much wider, more than rounding to single precision takes
@@ -83,13 +83,25 @@ def _bound(points: FloatArray, faces: IntArray, low: FloatArray, high: FloatArra
                 high[k] = max(high[k], value)
 
 
+@inlined
+def run_of(leaf: int, order: Int32Array, levels: int) -> tuple[int, int]:
+    """Where the sorted triangles of a leaf begin and end."""
+    return (leaf * len(order)) >> levels, ((leaf + 1) * len(order)) >> levels
+
+
+@inlined
+def corners_of(points: FloatArray, faces: IntArray, f: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The corners (3,) of a face."""
+    return points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
+
+
 @kernel
 def _write_centres(points: FloatArray, faces: IntArray, frame: FloatArray, centres: SingleArray) -> None:
     """Write the middle of each face (m, 3), in the frame."""
     for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        a, b, c = corners_of(points, faces, f)
         for k in range(3):
-            middle = (points[a, k] - frame[k]) + (points[b, k] - frame[k]) + (points[c, k] - frame[k])
+            middle = (a[k] - frame[k]) + (b[k] - frame[k]) + (c[k] - frame[k])
             centres[f, k] = middle * frame[3] / 3.0
 
 
@@ -100,9 +112,10 @@ def _write_boxes(
     """Write the boxes of the leaves, then those of their parents."""
     leaves = 1 << levels
     for leaf in range(leaves):
+        first, last = run_of(leaf, order, levels)
         for k in range(3):
             low, high = np.inf, -np.inf
-            for t in range((leaf * len(order)) >> levels, ((leaf + 1) * len(order)) >> levels):
+            for t in range(first, last):
                 for corner in range(3):
                     value = (points[faces[order[t], corner], k] - frame[k]) * frame[3]
                     low, high = min(low, value), max(high, value)
@@ -183,8 +196,9 @@ def _sum_dipoles(
     leaves = 1 << levels
     for leaf in range(leaves):
         node = leaves - 1 + leaf
-        for t in range((leaf * len(order)) >> levels, ((leaf + 1) * len(order)) >> levels):
-            a, b, c = points[faces[order[t], 0]], points[faces[order[t], 1]], points[faces[order[t], 2]]
+        first, last = run_of(leaf, order, levels)
+        for t in range(first, last):
+            a, b, c = corners_of(points, faces, order[t])
             ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
             vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
             x, y, z = 0.5 * (uy * vz - uz * vy), 0.5 * (uz * vx - ux * vz), 0.5 * (ux * vy - uy * vx)

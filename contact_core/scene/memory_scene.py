@@ -209,16 +209,7 @@ def _object_from_json(data: dict[str, Any], arrays: dict[str, Any]) -> MemoryObj
     if "polygons" in data:
         shape = Polygons(*(arrays[name] for name in data["polygons"]))
     else:
-        freedoms = tuple(
-            JointFreedom(
-                kind=kind,
-                order=order,
-                translates=translates,
-                # the last is not in files of earlier releases
-                **{name: arrays[key] for name, key in zip(_FREEDOM_ARRAYS, keys, strict=False)},
-            )
-            for kind, order, translates, *keys in data["freedoms"]
-        )
+        freedoms = tuple(_freedom_from_json(freedom, arrays) for freedom in data["freedoms"])
         name, meters_per_unit, up_axis = data["units"]
         rig_arrays = {key: arrays[value] for key, value in data["rig"].items()}
         joints = tuple(data["joints"])
@@ -232,3 +223,10 @@ def _object_from_json(data: dict[str, Any], arrays: dict[str, Any]) -> MemoryObj
         keys=tuple((float(frame), Pose(joints, arrays[key])) for frame, key in data["keys"]),
         selections={name: arrays[key] for name, key in data["selections"].items()},
     )
+
+
+def _freedom_from_json(data: list[Any], arrays: dict[str, Any]) -> JointFreedom:
+    kind, order, translates, *keys = data
+    names = _FREEDOM_ARRAYS if len(keys) >= len(_FREEDOM_ARRAYS) else _FREEDOM_ARRAYS[:-1]  # new in this release
+    parts = {name: arrays[key] for name, key in zip(names, keys, strict=True)}
+    return JointFreedom(kind=kind, order=order, translates=translates, **parts)

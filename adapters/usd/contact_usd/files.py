@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -119,7 +119,10 @@ def named(paths: Sequence[str]) -> str:
 
 
 def _host(
-    path: Path | None, meters_per_unit: float = 1.0, up_axis: str = "Y", frames_per_second: float = 24.0
+    path: Path | None,
+    meters_per_unit: float = 1.0,
+    up_axis: Literal["X", "Y", "Z"] = "Y",
+    frames_per_second: float = 24.0,
 ) -> UsdHost:
     try:
         from contact_usd.host import UsdHost
@@ -129,7 +132,7 @@ def _host(
 
     if path is not None:
         return UsdHost(path)
-    return UsdHost(space=SceneSpace(meters_per_unit, up_axis, frames_per_second))  # type: ignore[arg-type]
+    return UsdHost(space=SceneSpace(meters_per_unit, up_axis, frames_per_second))
 
 
 def _one_mesh(host: UsdHost, path: Path, ids: list[str]) -> Asset:

@@ -27,6 +27,7 @@ _UNITS_3MF = {
     "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0,
 }  # fmt: skip
 _CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+# What zipfile raises while it reads a damaged archive: an odd version or method, a lock, a cut, a number too large.
 _DAMAGED_ZIP = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError)
 _DEEPEST = 32  # components within components
 

@@ -137,20 +137,26 @@ class Page:
         self.drag_pixels(*((x * width, y * height) for x, y in path))
 
     def drag_pixels(self, *path: tuple[float, float]) -> None:
-        """The same by pixels of the view; no faster than a hand, and never two moves in one frame of the browser,
-        which would make one of them."""
+        """The same by pixels of the view; no faster than a hand, and every move arrives."""
         (left, top), mouse = self.corner(), self.page.mouse
         places = [(left + x, top + y) for x, y in path]
         mouse.move(*places[0])
         mouse.down()
         for place in places[1:]:
-            self._frame()
+            self._arrive()
             mouse.move(*place)
-        self._frame()
+        self._arrive()
         mouse.up()
 
-    def _frame(self) -> None:
+    def _arrive(self) -> None:
+        """Wait until the server has every event so far. The browser makes one of two moves in a frame, and the page
+        one of all moves that wait while the server owes it an answer, which it sends a few milliseconds after: so
+        the answer first, then a pause of more than that and two frames, then the answer to what was sent in it."""
+        self._answer()
         self.page.wait_for_timeout(30)
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        # The page makes one of two moves that wait for a busy server: an answer to what is no key says it has them.
+        self._answer()
+
+    def _answer(self) -> None:
+        """Ask the server something that changes nothing."""
         self.page.evaluate("() => trame.trigger('key', [{}])")

@@ -101,29 +101,20 @@ class Twins:
         """A tool and a gesture: one step of that name, which is the same step in the browser."""
         if key:
             self.key(key)
-        for tries in (1, 2, 3):  # where both are busy the page makes one of two moves: the gesture is made again
-            revision = self.sight.app.session.revision
-            self.drag(*pixels, held=held)
-            app = self.sight.app
-            assert app.session.revision == revision + 1, (title, app.line(), app.refusal())
-            assert app.undo_name().startswith(title)
-            if tries == 3 or contacts(self.kept()) == contacts(app.session.document):
-                break
-            self.key("Ctrl+Z")
-            self.kept()
+        revision = self.sight.app.session.revision
+        self.drag(*pixels, held=held)
+        app = self.sight.app
+        assert app.session.revision == revision + 1, (title, app.line(), app.refusal())
+        assert app.undo_name().startswith(title)
         return self.agree(title)
-
-    def kept(self) -> ContactDocument:
-        """The document of the browser's server, once it is as far as the twin."""
-        self.page.until(f"() => trame.state.get('undo_name') === {json.dumps(self.sight.app.undo_name())}")
-        found = Recovery(self.sources, self.served.folder / "state").found()
-        assert found is not None
-        return found
 
     def agree(self, title: str) -> ContactDocument:
         """Wait for the step in the browser, and hold it against the twin's: contacts to the last bit, poses by how
         far pairs are apart, since other frames take the hand other ways."""
-        kept, wanted = self.kept(), self.sight.app.session.document
+        self.page.until(f"() => trame.state.get('undo_name') === {json.dumps(self.sight.app.undo_name())}")
+        kept = Recovery(self.sources, self.served.folder / "state").found()
+        wanted = self.sight.app.session.document
+        assert kept is not None
         assert contacts(kept) == contacts(wanted), title
         assert set(kept.poses) == set(wanted.poses)
         assert self.gaps(kept) == pytest.approx(self.gaps(wanted), abs=1e-3)

@@ -139,21 +139,24 @@ def _pixels(places: Any, region: Any, scale: float) -> Any:
 
 def _draw_ground(lanes: int, region: Any, scale: float) -> None:
     """Dark, so that bars are read over the rows of channels."""
-    low, top, wide = 0.85 * _ABOVE * scale, (_ABOVE + lanes * _LANE) * scale, float(region.width)
-    ground = [(0, low), (wide, low), (wide, top), (0, low), (wide, top), (0, top)]
-    _fill(np.array(ground), np.tile((0.08, 0.08, 0.08, 0.72), (6, 1)))
+    _fill(*_box(0.0, 0.85 * _ABOVE * scale, float(region.width), (_ABOVE + lanes * _LANE) * scale, 0.72))
 
 
 def _write_names(names: Sequence[str], scale: float) -> None:
-    """Over all else, with a shadow, at the left of each lane."""
+    """Over all else at the left of each lane, on dark ground, for a bar may begin there."""
     blf.size(0, _WORDS * scale)
     blf.color(0, 1.0, 1.0, 1.0, 0.95)
-    blf.enable(0, blf.SHADOW)
-    blf.shadow(0, 5, 0.0, 0.0, 0.0, 1.0)
     for place, name in enumerate(names):
-        blf.position(0, 8.0 * scale, (_ABOVE + (place + 0.3) * _LANE) * scale, 0.0)
+        low = (_ABOVE + place * _LANE) * scale
+        _fill(*_box(0.0, low, blf.dimensions(0, name)[0] + 14.0 * scale, low + _LANE * scale, 0.55))
+        blf.position(0, 8.0 * scale, low + 0.3 * _LANE * scale, 0.0)
         blf.draw(0, name)
-    blf.disable(0, blf.SHADOW)
+
+
+def _box(left: float, low: float, right: float, high: float, opacity: float) -> tuple[Any, Any]:
+    """Corners (6, 2) and colours (6, 4) of a dark rectangle."""
+    corners = [(left, low), (right, low), (right, high), (left, low), (right, high), (left, high)]
+    return np.array(corners), np.tile((0.08, 0.08, 0.08, opacity), (6, 1))
 
 
 def _draw_lines(ends: Any, colors: Any, scale: float) -> None:
