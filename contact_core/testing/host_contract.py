@@ -10,6 +10,7 @@ class TestMyHost(HostContract):
 from __future__ import annotations
 
 from contact_core.testing.contract import Contract
+from contact_core.testing.host_clauses.animation import AnimationClauses
 from contact_core.testing.host_clauses.documents import DocumentClauses
 from contact_core.testing.host_clauses.extras import ExtraClauses
 from contact_core.testing.host_clauses.ground import Build
@@ -24,6 +25,7 @@ __all__ = ["Build", "HostContract"]
 
 # pytest collects the bases from the last to the first, so this is the order of the clauses' numbers.
 class HostContract(
+    AnimationClauses,
     OrderClauses,
     SessionClauses,
     ExtraClauses,

@@ -13,6 +13,8 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.rig.rig import JointFreedom, Pose, Rig, forward_kinematics
 from contact_core.scene.host import SceneSpace
 
+FINGERS = ("wrist", "thumb")  # joints of `arm_rig` that both its instances have in a group "fingers"
+
 
 @dataclass(frozen=True, eq=False)
 class SceneMesh:
@@ -30,11 +32,13 @@ class SceneMesh:
 
 @dataclass(frozen=True, eq=False)
 class SceneRig:
-    """A skinned rig to make in the host, bound in its rest pose. world_from_local: (4, 4)."""
+    """A skinned rig to make in the host, bound in its rest pose. world_from_local: (4, 4). groups: joints to put
+    together under a name, where the host has groups or collections of bones."""
 
     name: str
     rig: Rig
     world_from_local: FloatArray = field(default_factory=lambda: np.eye(4))
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,7 @@ def contract_scene(space: SceneSpace) -> HostScene:
     triangles = octahedron()
     step = step_prism()
     moved = affine((0.3, -0.8, 0.4), (1.0, 1.0, 1.0), (5.0, -2.0, 1.0))
-    rig = arm_rig()
+    rig, groups = arm_rig(), {"fingers": FINGERS}
     return HostScene(
         space,
         meshes=(
@@ -72,8 +76,8 @@ def contract_scene(space: SceneSpace) -> HostScene:
             SceneMesh("child", *triangles, affine((0.0, 0.0, 0.5), (0.5, 0.5, 0.5), (0.0, 3.0, 0.0)), "moved"),
         ),
         rigs=(
-            SceneRig("arm", rig, affine((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (-4.0, 0.0, 0.0))),
-            SceneRig("half_arm", rig, affine((0.4, 0.0, 1.0), (0.5, 0.5, 0.5), (-8.0, 1.0, 0.0))),
+            SceneRig("arm", rig, affine((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (-4.0, 0.0, 0.0)), groups),
+            SceneRig("half_arm", rig, affine((0.4, 0.0, 1.0), (0.5, 0.5, 0.5), (-8.0, 1.0, 0.0)), groups),
         ),
     )
 

@@ -23,6 +23,7 @@ from contact_core.errors import Cancelled, FileRefused
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.polar import split_world_from_local
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.rig.pose_keys import PoseKeys
 from contact_core.rig.rig import Pose
 from contact_core.scene.host import DocumentStamp, SceneObject, SceneSpace
 from contact_core.scene.memory_host import MemoryHost
@@ -30,17 +31,26 @@ from contact_core.testing.host_contract import Build, HostContract
 from contact_core.testing.host_scenes import HostScene
 from contact_core.testing.mutants import Mutant
 
-_spec = importlib.util.spec_from_file_location("memory_subject", Path(__file__).with_name("test_memory_host.py"))
-assert _spec is not None and _spec.loader is not None
-_subject = importlib.util.module_from_spec(_spec)
-sys.modules.setdefault("memory_subject", _subject)
-_spec.loader.exec_module(_subject)
+
+def _loaded(name: str, file: str) -> Any:
+    """A test module beside this one; test folders are no packages where mutants are judged."""
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(file))
+        assert spec is not None and spec.loader is not None
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+
+
+_subject = _loaded("memory_subject", "test_memory_host.py")
+_animated = _loaded("animated_subject", "test_animated_host.py")
 
 
 class OnMemory(HostContract):
     """A subject that builds the nested class `Host`."""
 
     Host: ClassVar[type[MemoryHost]] = MemoryHost
+    cannot = _subject.NO_ANIMATION
 
     @pytest.fixture
     def build(self) -> Build:
@@ -596,3 +606,161 @@ class TestGivesJointsInItsOwnOrder(Mutant, OnMemory):
             pose = super().read_pose(object_id, frame)
             order = [pose.joints.index(name) for name in self.scene.objects[object_id].rig.joints]
             return Pose(tuple(pose.joints[k] for k in order), pose.local[order])
+
+
+class OnAnimated(OnMemory):
+    """A subject that builds the nested class `Host` with curves and a choice of bones."""
+
+    Host: ClassVar[type[MemoryHost]] = _animated.AnimatedHost
+    cannot: ClassVar[Mapping[str, str]] = {}
+    choice_of = _animated.TestAnimatedHost.choice_of
+
+    @pytest.fixture
+    def build(self) -> Build:
+        return lambda scene: _animated.build_animated(scene, self.Host)
+
+    def scene_state(self, host: MemoryHost) -> Any:
+        curves = [getattr(item, "curves", None) for item in host.scene.objects.values()]
+        return super().scene_state(host), curves, [host.pose_keys(item.id) for item in _rigs(host)]
+
+
+def _rigs(host: MemoryHost) -> list[SceneObject]:
+    return [item for item in host.objects() if item.kind == "rig"]
+
+
+class TestBlendsCubicKeysStraight(Mutant, OnAnimated):
+    breaks = "H39"
+    consequences = ("H40", "H42")  # which look between the keys, too
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+            still = tuple(np.zeros_like(each) for each in pose_keys.speeds)
+            super().write_curves(object_id, replace(pose_keys, speeds=still))
+
+
+class TestForgetsTheScaleInCurves(Mutant, OnAnimated):
+    breaks = "H39"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+            self._put("Curves", object_id, self._animated(object_id).with_curves(pose_keys))
+
+
+class TestLetsCurvesTakeAllKeys(Mutant, OnAnimated):
+    breaks = "H40"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+            with self.step("Curves"):
+                self._put("Clear", object_id, replace(self._animated(object_id), keys=(), curves={}))
+                super().write_curves(object_id, pose_keys)
+
+
+class TestLeavesKeysUnderCurves(Mutant, OnAnimated):
+    breaks = "H40"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+            with self.step("Curves"):
+                keys = self._animated(object_id).keys
+                super().write_curves(object_id, pose_keys)
+                self._put("Keep", object_id, replace(self._animated(object_id), keys=keys))
+
+
+class TestBakesOtherJointsIntoCurves(Mutant, OnAnimated):
+    breaks = "H40"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+            with self.step("Curves"):
+                for frame in pose_keys.frames:
+                    self.write_pose(object_id, self.read_pose(object_id, None), frame)
+                super().write_curves(object_id, pose_keys)
+
+
+class TestMakesAStepOfEachJoint(Mutant, OnAnimated):
+    breaks = "H41"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def write_curves(self, object_id: str, pose_keys: PoseKeys) -> None:
+            for row, name in enumerate(pose_keys.poses[0].joints):
+                poses = tuple(Pose((name,), pose.local[row : row + 1]) for pose in pose_keys.poses)
+                speeds = tuple(each[row : row + 1] for each in pose_keys.speeds)
+                super().write_curves(object_id, replace(pose_keys, poses=poses, speeds=speeds))
+
+
+class TestDropsCurvesOnSave(Mutant, OnAnimated):
+    breaks = "H42"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def save(self, path: Path | None = None) -> None:
+            whole = self._scene
+            objects = {key: replace(item, curves={}) for key, item in whole.objects.items()}
+            self._scene = replace(whole, objects=objects)
+            try:
+                super().save(path)
+            finally:
+                self._scene = whole
+
+
+class TestKeepsChoicesOutOfItsUndo(Mutant, OnAnimated):
+    breaks = "H43"
+    consequences = ("H45",)  # nor are they in what is saved
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            self.chosen: dict[str, str] = {}
+
+        def choose_bones(self, object_id: str, choice: str) -> None:
+            super().choose_bones(object_id, choice)
+            self.undo()
+            self.chosen[object_id] = choice
+
+        def bones_of(self, object_id: str) -> str:
+            return self.chosen.get(object_id, "all")
+
+        def freedoms(self, object_id: str) -> Any:
+            chosen = replace(self._animated(object_id), chosen=self.bones_of(object_id))
+            return _animated.AnimatedHost(scene=self.scene.with_object(object_id, chosen)).freedoms(object_id)
+
+
+class TestTakesAnyWordForAChoice(Mutant, OnAnimated):
+    breaks = "H43"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def choose_bones(self, object_id: str, choice: str) -> None:
+            self._put("Choose bones", object_id, replace(self._animated(object_id), chosen=choice))
+
+
+class TestDoesNotTellTheRigWhatIsChosen(Mutant, OnAnimated):
+    breaks = "H44"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def read_rig(self, object_id: str) -> Asset:
+            return MemoryHost.read_rig(self, object_id)
+
+
+class TestFreesWhatIsChosenOfItsLimits(Mutant, OnAnimated):
+    breaks = "H44"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def freedoms(self, object_id: str) -> Any:
+            known = super().freedoms(object_id)
+            if self.bones_of(object_id) == "all":
+                return known
+            return tuple(each if each.kind == "fixed" else replace(each, translates=True) for each in known)
+
+
+class TestForgetsTheChoiceOnSave(Mutant, OnAnimated):
+    breaks = "H45"
+
+    class Host(_animated.AnimatedHost):  # type: ignore[misc, name-defined]
+        def save(self, path: Path | None = None) -> None:
+            whole = self._scene
+            objects = {key: replace(item, chosen="all") for key, item in whole.objects.items()}
+            self._scene = replace(whole, objects=objects)
+            try:
+                super().save(path)
+            finally:
+                self._scene = whole

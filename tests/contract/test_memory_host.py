@@ -12,6 +12,11 @@ from contact_core.scene.memory_host import MemoryHost
 from contact_core.testing.host_contract import Build, HostContract
 from contact_core.testing.host_scenes import HostScene, arm_rig
 
+NO_ANIMATION = {
+    "curves": "keys are whole poses, joined by straight blends",
+    "bones": "its rigs have no bones but those that are posed",
+}
+
 
 def build_in_memory(scene: HostScene, host_type: type[MemoryHost] = MemoryHost) -> MemoryHost:
     """The contract's scene in a fresh memory host, with nothing left to undo."""
@@ -32,6 +37,7 @@ def build_in_memory(scene: HostScene, host_type: type[MemoryHost] = MemoryHost) 
 
 class TestMemoryHost(HostContract):
     subject = "memory"
+    cannot = NO_ANIMATION
 
     @pytest.fixture
     def build(self) -> Build:

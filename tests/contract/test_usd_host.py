@@ -38,6 +38,8 @@ class TestUsdHost(HostContract):
         "display": NO_VIEW,
         "picking": NO_VIEW,
         "progress": "a stage has no user; the command line tells the progress",
+        "curves": "the joints of a UsdSkel animation have time samples, which are joined by straight blends",
+        "bones": "a UsdSkel skeleton has no joints but those that are posed",
     }
 
     @pytest.fixture(params=[".usda", ".usdc"])

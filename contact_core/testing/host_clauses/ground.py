@@ -35,6 +35,10 @@ class HostGround:
         """One undoable edit that is none of ours, made with the host's own means, as its user would."""
         raise NotImplementedError("give foreign_edit, or decline `foreign_edits`")
 
+    def choice_of(self, group: str) -> str:
+        """What `choose_bones` takes for a group of joints of the scene (`SceneRig.groups`)."""
+        raise NotImplementedError("give choice_of, or decline `bones`")
+
     def scene_state(self, host: Any) -> Any:
         """Comparable state of the whole scene; override with something that also sees what hosts do not read."""
         return readable_state(host)

@@ -27,7 +27,12 @@ def build(scene: HostScene) -> BlenderHost:
         for name, vertices in item.selections.items():
             made.vertex_groups.new(name=name).add(list(vertices), 1.0, "REPLACE")
     for rig in scene.rigs:
-        skinned(rig.rig, rig.name).parent.matrix_basis = Matrix(rig.world_from_local.tolist())
+        armature = skinned(rig.rig, rig.name).parent
+        armature.matrix_basis = Matrix(rig.world_from_local.tolist())
+        for group, names in rig.groups.items():
+            collection = armature.data.collections.new(group)
+            for name in names:
+                collection.assign(armature.data.bones[name])
     bpy.context.view_layer.update()
     return BlenderHost()
 

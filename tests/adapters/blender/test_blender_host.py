@@ -22,6 +22,9 @@ class TestBlenderHost(HostContract):
     def build(self, scenes: Any) -> Build:
         return scenes.build
 
+    def choice_of(self, group: str) -> str:
+        return f"collection:{group}"
+
     def foreign_edit(self, host: Any) -> None:
         import bpy
 

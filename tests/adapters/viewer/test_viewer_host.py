@@ -6,7 +6,7 @@ import pytest
 
 from contact_core.testing.host_contract import Build, HostContract
 from contact_core.testing.host_scenes import HostScene
-from tests.contract.test_memory_host import build_in_memory
+from tests.contract.test_memory_host import NO_ANIMATION, build_in_memory
 
 pytest.importorskip("vtkmodules")
 
@@ -15,6 +15,7 @@ from contact_viewer.host import ViewerHost
 
 class TestViewerHost(HostContract):
     subject = "viewer"
+    cannot = NO_ANIMATION
 
     @pytest.fixture
     def build(self) -> Build:
