@@ -29,9 +29,9 @@ from contact_core.document.schema import dump_document
 from contact_core.farm.batch import BatchResult, BatchSettings, run_batch
 from contact_core.farm.task import RECEIPT
 from contact_core.farm.workers import KILL, LocalWorkers
-from contact_core.geometry.warm_up import warm_up
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import FORMATS
+from contact_core.solve.warm_up import warm_up
 from contact_core.testing import meshes
 from contact_core.testing.format_contract import bar
 

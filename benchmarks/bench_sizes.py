@@ -33,9 +33,9 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
-from contact_core.geometry.warm_up import warm_up
 from contact_core.rig.rig import JointFreedom, Rig, skin
 from contact_core.solve.solver import SolveOptions
+from contact_core.solve.warm_up import warm_up
 from contact_core.testing import meshes
 
 ROWS: dict[str, str] = {}

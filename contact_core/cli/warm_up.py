@@ -17,7 +17,7 @@ class WarmUp:
         """No options of its own."""
 
     def run(self, arguments: argparse.Namespace) -> int:
-        from contact_core.geometry.warm_up import warm_up
+        from contact_core.solve.warm_up import warm_up
 
         seconds = warm_up() + _closing(arguments.plugins)
         arguments.output.answer({"seconds": seconds}, f"the kernels are ready ({seconds:.1f} s)")

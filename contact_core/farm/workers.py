@@ -231,7 +231,7 @@ def _end_with(parent: Any) -> None:
 
 def _warm() -> int:
     """Compile the kernels, or load them; the process id."""
-    from contact_core.geometry.warm_up import warm_up
+    from contact_core.solve.warm_up import warm_up
 
     warm_up()
     return os.getpid()

@@ -90,44 +90,24 @@ class DistanceField:
         return cls(low, spacing, values)
 
     def distances(self, points: FloatArray) -> FloatArray:
-        """(k,) signed distance at points (k, 3), that of `sample` at a third of its cost."""
-        values, share, beyond = self._cells(points)
-        for axis in range(3):
-            values = _mix(values, share[:, axis])
-        return values + np.linalg.norm(beyond, axis=1)
+        """(k,) signed distance at points (k, 3), that of `sample`."""
+        return self._sampled(points, np.empty((0, 3)))
 
     def sample(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed distance (k,) and gradient (k, 3) at points (k, 3).
 
         Outside the grid: the value at the nearest point of the grid's box plus the distance to it.
         """
-        values, share, beyond = self._cells(points)
-        x, y, z = share.T
-        along = _mix(values, x)  # (2, 2, k)
-        across = _mix(along, y)  # (2, k)
-        slopes = _mix(_mix(values[1] - values[0], y), z), _mix(along[1] - along[0], z), across[1] - across[0]
-        value, gradient = _mix(across, z), np.stack(slopes, -1) / self.spacing  # (k,), (k, 3)
-        away = np.linalg.norm(beyond, axis=1)
-        outside = away > 0
-        if outside.any():
-            value = value + away
-            gradient = np.where(beyond == 0.0, gradient, 0.0)  # the clamped coordinate no longer varies
-            gradient[outside] += beyond[outside] / away[outside, None]
-        return value, gradient
+        gradients = np.empty((len(points), 3))
+        return self._sampled(points, gradients), gradients
 
-    def _cells(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of points (k, 3): values (2, 2, 2, k) at the corners of their cells, shares (k, 3) in 0..1 of the way
-        through them, and the vector (k, 3) from the grid's box to the point, 0 inside."""
-        limit = np.array(self.values.shape) - 1  # (3,) cells
-        grid = (np.asarray(points, dtype=np.float64) - self.origin) / self.spacing  # (k, 3) in cells
-        clamped = np.clip(grid, 0.0, limit)
-        cell = np.minimum(clamped.astype(np.int64), limit - 1)  # (k, 3)
-        _, rows, columns = self.values.shape
-        first = (cell[:, 0] * rows + cell[:, 1]) * columns + cell[:, 2]
-        corners = np.array([0, 1, columns, columns + 1])
-        corners = np.concatenate([corners, corners + rows * columns])  # (8,) x slowest, z fastest
-        values = self.values.ravel().take(first + corners[:, None]).reshape(2, 2, 2, len(points))
-        return values, clamped - cell, (grid - clamped) * self.spacing
+    def _sampled(self, points: FloatArray, gradients: FloatArray) -> FloatArray:
+        from contact_core.geometry import field_kernels
+
+        distances = np.empty(len(points))
+        plain = np.require(points, np.float64, ("C", "W"))
+        field_kernels.sample(plain, self.origin, self.spacing, self.values, distances, gradients)
+        return distances
 
 
 def _signed_distances(mesh: TriangleMesh, low: FloatArray, spacing: float, shape: tuple[int, ...]) -> FloatArray:
@@ -145,8 +125,3 @@ def _signed_distances(mesh: TriangleMesh, low: FloatArray, spacing: float, shape
     source = np.ravel_multi_index(tuple(nearest), shape).ravel()  # (nodes,) a band node each
     distance = np.linalg.norm(nodes - feature[source], axis=1)
     return (sign[source] * distance).reshape(shape)
-
-
-def _mix(ends: FloatArray, share: FloatArray) -> FloatArray:
-    """What lies a share of the way between two ends (2, ...)."""
-    return ends[0] + (ends[1] - ends[0]) * share

@@ -168,7 +168,7 @@ def _skin_over_time(rig: Rig, poses: Sequence[Pose], placed: FloatArray, vertice
     points = np.empty((len(poses), len(vertices), 3))
     for row, pose in enumerate(poses):
         world = placed[row] @ forward_kinematics(rig.parents, pose_on(rig, pose))
-        points[row] = track.matrix @ world[:, :3].swapaxes(1, 2).reshape(-1, 3)[track.columns]
+        points[row] = track.carried(world[:, :3].swapaxes(1, 2).reshape(-1, 3))
     return points
 
 

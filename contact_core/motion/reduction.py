@@ -202,7 +202,8 @@ class _Skin:
         result = np.empty(len(off))
         step = max(1, 4_000_000 // max(len(self.track), 1))  # frames at a time: some hundred megabytes
         for start in range(0, len(off), step):
-            moved = self.track.matrix @ columns[start : start + step]
+            some = columns[start : start + step].transpose(1, 0, 2)  # (4 b, frames, 3)
+            moved = self.track.times(some.reshape(len(some), -1)).reshape(len(self.track), -1, 3).swapaxes(0, 1)
             squares = np.einsum("nvi,nvi->nv", moved, moved)
             if counted is not None:
                 squares = np.where(counted[start : start + step], squares, 0.0)

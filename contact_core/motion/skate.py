@@ -16,7 +16,7 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.motion.band import BlockBand
 from contact_core.motion.depth import HELD
-from contact_core.rig.skinning import Track
+from contact_core.rig.track import Track
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.state import PoseState
 
@@ -33,7 +33,7 @@ class ObjectGaps:
         else:
             bones, self.bone = np.zeros(0, np.int64), np.zeros(len(track), np.int64)
         self.is_placed = len(bones) > 0  # what black boxes evaluate has no bones: seen from the world
-        self.axes = Track(bones, np.eye(3 * len(bones)), 3)
+        self.axes = Track.axes(bones)
         self.gap = problem.pairs.gap
 
     def values(self, state: PoseState) -> FloatArray:

@@ -17,7 +17,7 @@ import numpy as np
 from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.rig.rig import ROTATION_DOFS, Pose, Rig
-from contact_core.rig.rotations import axis_numbers, cross_matrices, euler_chain, exponential, nearest_rotations
+from contact_core.rig.rotations import axis_numbers, nearest_rotations
 
 _AXIS_LETTERS = "xyz"
 
@@ -56,8 +56,10 @@ class Chart:
         self.size = int(starts[-1])
         self.joint_of_dof: IntArray = np.repeat(np.arange(len(rig.joints)), rotations + translations)
         self._lay_out_dofs()
-        self.levels = _levels(rig.parents)
         self.frames = np.array([f.frame for f in rig.freedoms]).reshape(-1, 3, 3)
+        depths = _depths(rig.parents)
+        self._order: IntArray = np.argsort(depths, kind="stable")
+        self._lay_out_turns()
         self.is_rigid = _is_rigid(rig.rest_local) and _is_rigid(self.world_from_rig[None])
 
     def _lay_out_dofs(self) -> None:
@@ -102,12 +104,27 @@ class Chart:
         self._euler_dofs = np.array(
             [np.arange(s.start, s.stop) for s in (self.rotation_slices[j] for j in euler_joints)], np.int64
         ).reshape(-1, 3)
-        self._euler_axes = np.array(
-            [axis_numbers(self.rig.freedoms[j].order) for j in euler_joints], np.int64
-        ).reshape(-1, 3)
         movers = [(s.start, j) for j, s in enumerate(self.translation_slices) if s.stop > s.start]
         self._moving_joints = np.array([j for _, j in movers], np.int64)
         self._moving_dofs = np.array([[s, s + 1, s + 2] for s, _ in movers], np.int64).reshape(-1, 3)
+
+    def _lay_out_turns(self) -> None:
+        """What kernels take of each joint (see chart_kernels)."""
+        kinds = {"hinge": 1, "ball": 1, "euler": 2}
+        freedoms = self.rig.freedoms
+        euler = [axis_numbers(f.order) if f.kind == "euler" else (0, 0, 0) for f in freedoms]
+        self._turning = (
+            np.array([kinds.get(freedom.kind, 0) for freedom in freedoms], np.int64),
+            np.array([s.stop - s.start for s in self.rotation_slices], np.int64),
+            np.array([s.start for s in self.rotation_slices], np.int64),
+            np.array([s.start if s.stop > s.start else -1 for s in self.translation_slices], np.int64),
+            np.array(euler, np.int64).reshape(-1, 3),
+            self.frames,
+        )
+        # Copies that may be written: kernels are compiled again for arrays that may not.
+        self._standing = tuple(
+            np.array(each) for each in (self.rig.parents, self.world_from_rig, self.rig.rest_local)
+        )
 
     def _couple(self) -> None:
         """Followers are no dofs of their own, and limits are kept on both ends."""
@@ -156,35 +173,17 @@ class Chart:
                 below[:, joint] |= below[:, parent]
         return below[self.joint_of_dof]
 
-    def turns(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Motions (j, 4, 4) of the joints within their rest frames, turning axes (d, 3), offsets (j, 3).
+    def turns(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Motions (j, 4, 4) of the joints within their rest frames, turning axes (d, 3).
 
         Axes are in the joint's rest frame: how the joint turns, in that frame, when a dof grows.
         """
-        j = len(self.rig.joints)
-        theta = self.coupled(theta) if len(self.followers) else theta
-        rotation = np.broadcast_to(np.eye(3), (j, 3, 3)).copy()
-        axes = np.zeros((self.size, 3))
-        if len(self._rotvec_dof):
-            vectors = np.zeros((j, 3))
-            vectors[self._rotvec_joint, self._rotvec_component] = theta[self._rotvec_dof]
-            turned, left = exponential(vectors[self._rotvec_joints])
-            rotation[self._rotvec_joints] = turned
-            row = np.searchsorted(self._rotvec_joints, self._rotvec_joint)
-            axes[self._rotvec_dof] = left[row, :, self._rotvec_component]
-        if len(self._euler_joints):
-            turned, turning = euler_chain(theta[self._euler_dofs], self._euler_axes)
-            rotation[self._euler_joints] = turned
-            axes[self._euler_dofs] = turning.transpose(0, 2, 1)
-        offset = np.zeros((j, 3))
-        if len(self._moving_joints):
-            offset[self._moving_joints] = theta[self._moving_dofs]
-        motion = np.zeros((j, 4, 4))
-        motion[:, :3, :3] = self.frames @ rotation @ self.frames.transpose(0, 2, 1)
-        motion[:, :3, 3] = offset
-        motion[:, 3, 3] = 1.0
-        axes = np.einsum("dab,db->da", self.frames[self.joint_of_dof], axes)
-        return motion, axes, offset
+        from contact_core.rig import chart_kernels
+
+        motion, axes = np.empty((len(self.rig.joints), 4, 4)), np.zeros((self.size, 3))
+        scratch = np.empty((2, 3, 3))
+        chart_kernels.turns(self.coupled(theta), *self._turning, scratch[0], scratch[1], motion, axes)
+        return motion, axes
 
     def local(self, theta: FloatArray, leftover: FloatArray | None = None) -> FloatArray:
         """(j, 4, 4) parent_from_joint at theta (d,); followers go where their leaders put them."""
@@ -193,23 +192,17 @@ class Chart:
 
     def motion(self, theta: FloatArray, leftover: FloatArray | None = None) -> Motion:
         """World transforms and generators at theta (d,); the generator of a leader does not move its followers."""
-        motion, axes, offset = self.turns(theta)
-        local = self.rig.rest_local @ motion
-        world = world_from_local(self, local if leftover is None else local @ leftover)
-        parents = self.rig.parents
-        base = np.where((parents >= 0)[:, None, None], world[parents], self.world_from_rig)  # (j, 4, 4)
-        frame = base @ self.rig.rest_local  # (j, 4, 4) world_from_rest_frame
-        centre = frame[:, :3, 3] + np.einsum("jab,jb->ja", frame[:, :3, :3], offset)  # (j, 3)
-        dof_frame = frame[self.joint_of_dof, :3, :3]  # (d, 3, 3)
-        generators = np.zeros((self.size, 3, 4))
-        if self.is_rigid and leftover is None:
-            linear = cross_matrices(np.einsum("dab,db->da", dof_frame, axes))
-        else:  # a scaled parent turns a rotation into a shear-like motion: A [axis] A^-1
-            linear = dof_frame @ cross_matrices(axes) @ np.linalg.inv(dof_frame)
-        generators[:, :, :3] = linear
-        generators[:, :, 3] = -np.einsum("dab,db->da", linear, centre[self.joint_of_dof])
-        if len(self._moving_joints):
-            generators[self._moving_dofs, :, 3] = frame[self._moving_joints, :3, :3].transpose(0, 2, 1)
+        from contact_core.rig import chart_kernels
+
+        motion, axes = self.turns(theta)
+        world, generators, scratch = np.empty_like(motion), np.zeros((self.size, 3, 4)), np.empty((2, 4, 4))
+        _, count, first, moving, _, _ = self._turning
+        parents, world_from_rig, rest = self._standing
+        left = np.empty((0, 4, 4)) if leftover is None else leftover
+        chart_kernels.move(
+            count, first, moving, self._order, parents, world_from_rig, rest, motion, left, axes,
+            self.is_rigid and leftover is None, scratch[0], scratch[1], world, generators,
+        )  # fmt: skip
         return Motion(world, generators)
 
     def theta_of(self, pose: Pose) -> tuple[FloatArray, FloatArray | None]:
@@ -252,22 +245,12 @@ def pose_on(rig: Rig, pose: Pose) -> FloatArray:
     return local
 
 
-def world_from_local(chart: Chart, local: FloatArray) -> FloatArray:
-    """(j, 4, 4) world_from_joint, one batched product per level of the tree."""
-    world = np.empty_like(local)
-    roots = chart.levels[0]
-    world[roots] = chart.world_from_rig @ local[roots]
-    for level in chart.levels[1:]:
-        world[level] = world[chart.rig.parents[level]] @ local[level]
-    return world
-
-
-def _levels(parents: IntArray) -> list[IntArray]:
-    """Joints by depth, roots first."""
+def _depths(parents: IntArray) -> IntArray:
+    """(j,) of joints in their tree, 0 for roots."""
     depth = np.zeros(len(parents), np.int64)
     for joint, parent in enumerate(parents):
         depth[joint] = 0 if parent < 0 else depth[parent] + 1
-    return [np.flatnonzero(depth == level) for level in range(int(depth.max(initial=0)) + 1)]
+    return depth
 
 
 def _is_rigid(transforms: FloatArray) -> bool:

@@ -1,20 +1,6 @@
-"""Points on skin as linear maps of the bones, which is what linear-blend skinning is.
-
-A point at fixed barycentric coordinates of a skinned face is a weighted sum of bone matrices times constant
-vectors: p_i = sum_b W_b h_ib, with W_b the world_from_joint of bone b and h_ib homogeneous in that joint.
-So a set of k points is one constant matrix H (k, 4b), and
-
-    points = H @ bones,   dp/dtheta = H @ dbones,   sum_i w_i |dp_i|^2 = dbones^T (H^T W H) dbones,
-
-exact for the interpolated skin, with no loop over points anywhere. Points on a rigid or fixed body are the
-same with one bone. The difference of two tracks is a track: a pair of contacts with gradients at both ends.
-"""
+"""Tracks of points, normals and vertices on the skin of a rig, and what carries normals."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -22,110 +8,7 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Rig
-
-
-@dataclass(frozen=True, eq=False)
-class Gram:
-    """What a weighted sum of squares needs of a track: sum_i w_i h_i h_i^T (width b, width b), and, where rows are
-    watched, the weights w (k,) themselves."""
-
-    matrix: FloatArray
-    weights: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """k vectors that the bones carry: points (`width` 4) or normals (`width` 3), not normalised.
-
-    bones: (b,) which bones of the problem (columns over all its bodies). matrix: (k, width * b).
-    watched: (k, m) sparse, what is added of the points or normals that black boxes evaluate; None: nothing.
-    """
-
-    bones: IntArray
-    matrix: FloatArray
-    width: int
-    watched: Any = None
-
-    def __len__(self) -> int:
-        return len(self.matrix)
-
-    @cached_property
-    def columns(self) -> IntArray:
-        """(width b,) the columns of the stacked bones that the matrix multiplies."""
-        return (self.bones[:, None] * self.width + np.arange(self.width)).ravel()
-
-    @property
-    def blocks(self) -> FloatArray:
-        """(k, b, width) the matrix by bones."""
-        return self.matrix.reshape(len(self), len(self.bones), self.width)
-
-    def combined(self, other: Track, factor: float = 1.0) -> Track:
-        """The track of self + factor * other, row by row."""
-        if len(self) != len(other) or self.width != other.width:
-            raise InvalidInput(
-                f"tracks add row by row, but one has {len(self)} rows of {self.width} and the other"
-                f" {len(other)} of {other.width}."
-            )
-        bones = np.union1d(self.bones, other.bones)
-        blocks = np.zeros((len(self), len(bones), self.width))
-        blocks[:, np.searchsorted(bones, self.bones)] += self.blocks
-        blocks[:, np.searchsorted(bones, other.bones)] += factor * other.blocks
-        parts = [part for part in (self.watched, _times(factor, other.watched)) if part is not None]
-        watched = None if not parts else parts[0] if len(parts) == 1 else parts[0] + parts[1]
-        return Track(bones, blocks.reshape(len(self), len(bones) * self.width), self.width, watched)
-
-    def rows(self, index: IntArray) -> Track:
-        """The track of some of the rows, in the order of `index`."""
-        watched = None if self.watched is None else self.watched[index]
-        return Track(self.bones, self.matrix[index], self.width, watched)
-
-    def scaled(self, factors: FloatArray) -> Track:
-        """The track with each row times its factor (k,)."""
-        watched = None if self.watched is None else self.watched.multiply(factors[:, None]).tocsr()
-        return Track(self.bones, self.matrix * factors[:, None], self.width, watched)
-
-    def gram(self, weights: FloatArray) -> Gram:
-        """Of weights (k,): all that a weighted sum of squares needs of k rows."""
-        return Gram(self.matrix.T @ (weights[:, None] * self.matrix), weights)
-
-    @classmethod
-    def empty(cls, width: int) -> Track:
-        """The track of nothing."""
-        return cls(np.zeros(0, np.int64), np.zeros((0, 0)), width)
-
-    @classmethod
-    def stacked(cls, tracks: list[Track]) -> Track:
-        """Several tracks below one another."""
-        bones = np.unique(np.concatenate([t.bones for t in tracks]))
-        width = tracks[0].width
-        blocks = np.zeros((sum(map(len, tracks)), len(bones), width))
-        row = 0
-        for track in tracks:
-            blocks[row : row + len(track), np.searchsorted(bones, track.bones)] = track.blocks
-            row += len(track)
-        return cls(bones, blocks.reshape(row, len(bones) * width), width, _stacked_watched(tracks))
-
-
-def watched_track(first: int, count: int, total: int, width: int) -> Track:
-    """The track of `count` points or normals that a black box evaluates, the `first`.. of all `total`."""
-    from scipy.sparse import csr_matrix
-
-    shares = csr_matrix((np.ones(count), (np.arange(count), np.arange(first, first + count))), shape=(count, total))
-    return Track(np.zeros(0, np.int64), np.zeros((count, 0)), width, shares)
-
-
-def _times(factor: float, watched: Any) -> Any:
-    return None if watched is None else factor * watched
-
-
-def _stacked_watched(tracks: list[Track]) -> Any:
-    total = next((track.watched.shape[1] for track in tracks if track.watched is not None), None)
-    if total is None:
-        return None
-    from scipy.sparse import csr_matrix, vstack
-
-    parts = [csr_matrix((len(t), total)) if t.watched is None else t.watched for t in tracks]
-    return vstack(parts, format="csr")
+from contact_core.rig.track import Track
 
 
 def point_track(rig: Rig, points: SurfacePoints, first_bone: int = 0) -> Track:
@@ -158,12 +41,8 @@ def vertex_track(rig: Rig, vertices: IntArray, first_bone: int = 0) -> Track:
 
 def joint_track(joints: IntArray, local_points: FloatArray, first_bone: int = 0) -> Track:
     """The track of points (k, 3) fixed in the frames of joints (k,)."""
-    bones = np.unique(joints)
-    blocks = np.zeros((len(joints), len(bones), 4))
-    columns = np.searchsorted(bones, joints)
-    blocks[np.arange(len(joints)), columns, :3] = local_points
-    blocks[np.arange(len(joints)), columns, 3] = 1.0
-    return Track(bones + first_bone, blocks.reshape(len(joints), 4 * len(bones)), 4)
+    homogeneous = np.concatenate([local_points, np.ones((len(local_points), 1))], axis=1)
+    return Track.gathered(np.arange(len(joints)), np.asarray(joints) + first_bone, homogeneous, len(joints))
 
 
 def joint_from_bind(rig: Rig) -> FloatArray:
@@ -214,9 +93,5 @@ def _gather(
 ) -> Track:
     used = weights > 0.0
     rows, joints, weights, values = rows[used], joints[used], weights[used], values[used]
-    bones = np.unique(joints)
-    width = values.shape[1]
     carried = np.einsum("eab,eb->ea", inverse_bind[joints], values) * weights[:, None]  # (e, width)
-    blocks = np.zeros((count, len(bones), width))
-    np.add.at(blocks, (rows, np.searchsorted(bones, joints)), carried)
-    return Track(bones + first_bone, blocks.reshape(count, len(bones) * width), width)
+    return Track.gathered(rows, joints + first_bone, carried, count)

@@ -11,7 +11,8 @@ import numpy as np
 from contact_core.arrays import FloatArray
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Rig
-from contact_core.rig.skinning import Track, normal_track, point_track, watched_track
+from contact_core.rig.skinning import normal_track, point_track
+from contact_core.rig.track import Track, watched_track
 
 if TYPE_CHECKING:
     from contact_core.solve.problem import PoseProblem
@@ -93,6 +94,8 @@ def _made_tracks(
         carried, turned = _carried(rig, first, mine, problem.kept_tracks)
         tracks.append(carried)
         normals.append(turned)
+    if len(order) == 1:
+        return tracks[0], normals[0]
     back = np.argsort(np.concatenate(order))
     return Track.stacked(tracks).rows(back), Track.stacked(normals).rows(back)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -17,7 +18,8 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.inside import depth_inside
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.transform import transform_points
-from contact_core.rig.skinning import Track, vertex_track
+from contact_core.rig.skinning import joint_track, vertex_track
+from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.state import PoseState
@@ -159,14 +161,27 @@ class Solid:
         return result
 
 
-class _Touch(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Touch:
     """The vertices of one skin that are too deep in one solid: rows, by how much (negative), world normals, surface
     points."""
 
+    skin: _Skin
+    solid: Solid
     rows: IntArray
     depth: FloatArray
     outward: FloatArray
     surface: FloatArray
+
+    @cached_property
+    def track(self) -> Track:
+        """The track of those vertices."""
+        return self.skin.track.rows(self.rows)
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """(k,) theirs."""
+        return self.skin.weights[self.rows]
 
 
 class _Depths:
@@ -176,39 +191,36 @@ class _Depths:
         self.unit, self.skins, self.solids = unit, skins, solids
 
     def value(self, state: PoseState) -> float:
-        return sum(float(s.weights[t.rows] @ (t.depth / self.unit) ** 2) for s, _, t in self._touches(state))
+        return sum(float(touch.weights @ (touch.depth / self.unit) ** 2) for touch in self._touches(state))
 
     def gradient(self, state: PoseState) -> FloatArray:
         result = np.zeros(len(state.theta))
-        for skin, solid, touch in self._touches(state):
-            forces = (2.0 / self.unit**2) * (skin.weights[touch.rows] * touch.depth)[:, None] * touch.outward
-            result += state.pull(skin.track.rows(touch.rows), forces)
-            if solid.movable:  # action and reaction: the solid is pushed where it is touched
-                result -= state.pull(_attached(solid, touch.surface), forces)
+        for touch in self._touches(state):
+            forces = (2.0 / self.unit**2) * (touch.weights * touch.depth)[:, None] * touch.outward
+            result += state.pull(touch.track, forces)
+            if touch.solid.movable:  # action and reaction: the solid is pushed where it is touched
+                result -= state.pull(_attached(touch.solid, touch.surface), forces)
         return result
 
     def normal_matrix(self, state: PoseState) -> FloatArray:
         result = np.zeros((len(state.theta), len(state.theta)))
-        for skin, solid, touch in self._touches(state):
-            moved = state.jacobian(skin.track.rows(touch.rows))  # (k, 3, d)
-            if solid.movable:
-                moved = moved - state.jacobian(_attached(solid, touch.surface))
+        for touch in self._touches(state):
+            moved = state.jacobian(touch.track)  # (k, 3, d)
+            if touch.solid.movable:
+                moved = moved - state.jacobian(_attached(touch.solid, touch.surface))
             along = np.einsum("ki,kid->kd", touch.outward, moved)
-            result += (2.0 / self.unit**2) * along.T @ (skin.weights[touch.rows, None] * along)
+            result += (2.0 / self.unit**2) * along.T @ (touch.weights[:, None] * along)
         return result
 
-    def _touches(self, state: PoseState) -> list[tuple[_Skin, Solid, _Touch]]:
-        """Per skin and solid with anything too deep: both, and what is; found once per state."""
-        kept: list[tuple[_Skin, Solid, _Touch]] | None = state.memory.get(self)
+    def _touches(self, state: PoseState) -> list[_Touch]:
+        """Per skin and solid with anything too deep, what is; found once per state."""
+        kept: list[_Touch] | None = state.memory.get(self)
         if kept is None:
-            kept = []
-            for skin in self.skins:
-                for body, solid in self.solids.items():
-                    if body != skin.body:
-                        touch = _touch(state, skin, solid)
-                        if len(touch.rows):
-                            kept.append((skin, solid, touch))
-            state.memory[self] = kept
+            pairs = (
+                (skin, solid) for skin in self.skins for body, solid in self.solids.items() if body != skin.body
+            )
+            found = (_touch(state, skin, solid) for skin, solid in pairs)
+            kept = state.memory[self] = [touch for touch in found if len(touch.rows)]
         return kept
 
 
@@ -220,14 +232,13 @@ def _touch(state: PoseState, skin: _Skin, solid: Solid) -> _Touch:
     rows = rows[solid.scale * solid.distances(points[rows]) + skin.allowed[rows] < 0.0]
     distance, gradient = solid.sample(points[rows])
     depth = solid.scale * distance + skin.allowed[rows]
-    return _Touch(rows, depth, solid.scale * gradient @ surface_from_world[:3, :3], points[rows])
+    return _Touch(skin, solid, rows, depth, solid.scale * gradient @ surface_from_world[:3, :3], points[rows])
 
 
 def _attached(solid: Solid, surface: FloatArray) -> Track:
     """The track of points (k, 3) that ride on a solid, given in its surface space."""
     joint_from_surface = np.linalg.inv(solid.surface_from_joint)
-    homogeneous = np.concatenate([surface, np.ones((len(surface), 1))], axis=1)
-    return Track(np.array([solid.bone]), homogeneous @ joint_from_surface.T, 4)
+    return joint_track(np.full(len(surface), solid.bone), transform_points(joint_from_surface, surface))
 
 
 def solids_of(problem: PoseProblem, solids: Solids | None, resolution: int = RESOLUTION) -> dict[str, Solid]:

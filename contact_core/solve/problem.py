@@ -15,7 +15,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.chart import Chart, Motion
 from contact_core.rig.rig import Pose
-from contact_core.rig.skinning import Track
+from contact_core.rig.track import Track
 from contact_core.solve.black_box import BlackBoxChart, BlackBoxMotion
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.extent import length_of

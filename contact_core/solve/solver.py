@@ -219,7 +219,8 @@ class Run:
 
     def evaluate(self, theta: FloatArray) -> tuple[PoseState, float]:
         """The state and the objective at theta (d,); infinite where it is not a number."""
-        state = self.problem.state(theta)
+        start = self.problem.start_state  # what was found there at binding and for the first value is kept
+        state = start if np.array_equal(theta, start.theta) else self.problem.state(theta)
         value = self.problem.value(state)
         value = value if np.isfinite(value) else np.inf
         self.evaluations += 1

@@ -13,7 +13,8 @@ import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.rig.chart import Motion
-from contact_core.rig.skinning import Gram, Track, outward_carrier
+from contact_core.rig.skinning import outward_carrier
+from contact_core.rig.track import Gram, Track
 from contact_core.solve.black_box import BlackBoxMotion
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ class PoseState:
         key = id(track)
         if key not in self._vectors:
             carrier = self._bones if track.width == 4 else self._carriers
-            vectors = track.matrix @ carrier[track.columns]
+            vectors = track.carried(carrier)
             if track.watched is not None:
                 vectors = vectors + track.watched @ self._watched[track.width]
             self._vectors[key] = track, vectors
@@ -66,18 +67,16 @@ class PoseState:
         """
         if self.problem.is_still(track):
             return np.zeros(len(self.theta))
-        result = self._pull_on_bones(track, forces[None])[:, 0]
+        result = self._pull_on_bones(track, forces)
         if self._moves_watched(track):
             moved = self._watched_derivative(track.width)  # (q, m, 3)
             result[self.problem.watched_dofs] += moved.reshape(len(moved), -1) @ (track.watched.T @ forces).ravel()
         return result
 
     def _pull_on_bones(self, track: Track, forces: FloatArray) -> FloatArray:
-        """(d, f) the virtual work of several sets of forces (f, k, 3) through the bones alone."""
-        sets, k, _ = forces.shape
-        per_bone = forces.transpose(0, 2, 1).reshape(3 * sets, k) @ track.matrix  # (3 f, width b)
-        moved = self._derivative(track)
-        result: FloatArray = moved.reshape(len(moved), -1) @ per_bone.reshape(sets, -1).T
+        """(d,) the virtual work of forces (k, 3) through the bones alone."""
+        per_bone = track.gathered_by_bones(forces)  # (width b, 3)
+        result: FloatArray = self._derivative(track).reshape(len(self.theta), -1) @ per_bone.T.ravel()
         return result
 
     def quadratic(self, track: Track, gram: Gram) -> FloatArray:
@@ -89,7 +88,7 @@ class PoseState:
         if self._moves_watched(track):
             own = self._watched_rows(track)  # (q, k, 3)
             weighted, dofs = own * gram.weights[:, None], self.problem.watched_dofs
-            cross = self._pull_on_bones(track, weighted)  # (d, q)
+            cross = np.stack([self._pull_on_bones(track, forces) for forces in weighted], axis=1)  # (d, q)
             result[:, dofs] += cross
             result[dofs] += cross.T
             result[np.ix_(dofs, dofs)] += weighted.reshape(len(own), -1) @ own.reshape(len(own), -1).T
@@ -98,7 +97,7 @@ class PoseState:
     def jacobian(self, track: Track) -> FloatArray:
         """(k, 3, d) derivative of the track's vectors."""
         d = len(self.theta)
-        flat = track.matrix @ self._derivative(track).reshape(3 * d, -1).T  # (k, 3 d)
+        flat = track.times(self._derivative(track).reshape(3 * d, -1).T)  # (k, 3 d)
         result: FloatArray = flat.reshape(len(track), d, 3).transpose(0, 2, 1)
         if self._moves_watched(track):
             result[:, :, self.problem.watched_dofs] += self._watched_rows(track).transpose(1, 2, 0)

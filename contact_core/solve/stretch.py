@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -10,7 +11,8 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.rig.rig import Rig
-from contact_core.rig.skinning import Track, vertex_track
+from contact_core.rig.skinning import vertex_track
+from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.state import PoseState
@@ -49,25 +51,35 @@ class SkinStretchTerm(HasSettings):
                 lengths = uniform_scale(body.world_from_rig) * np.linalg.norm(
                     points[edges[:, 1]] - points[edges[:, 0]], axis=1
                 )
-                skins.append(_Edges(second.combined(first, -1.0), lengths, self.weight * share / _SHARE))
+                free = (self.allowed * lengths) ** 2
+                skins.append(_Edges(second.combined(first, -1.0), lengths, free, self.weight * share / _SHARE))
         return _Stretch(skins, self.allowed)
 
 
 class _Edges(NamedTuple):
-    """Edges of one skin as vectors: their track, rest lengths (e,), and what each counts."""
+    """Edges of one skin as vectors: their track, rest lengths (e,), squares of lengths that cost nothing (e,), and
+    what each counts."""
 
     track: Track
     lengths: FloatArray
+    free: FloatArray
     weight: float
 
 
-class _TooLong(NamedTuple):
-    """rows (k,) of edges, by how much they are stretched beyond what is allowed (k,), and which way per length
-    (k, 3)."""
+@dataclass(frozen=True, eq=False)
+class _TooLong:
+    """What is too long of one skin: rows (k,) of its edges, by how much they are stretched beyond what is allowed
+    (k,), and which way per length (k, 3)."""
 
+    skin: _Edges
     rows: IntArray
     excess: FloatArray
     along: FloatArray
+
+    @cached_property
+    def track(self) -> Track:
+        """The track of those edges."""
+        return self.skin.track.rows(self.rows)
 
 
 class _Stretch:
@@ -77,36 +89,36 @@ class _Stretch:
         self.skins, self.allowed = skins, allowed
 
     def value(self, state: PoseState) -> float:
-        return sum(skin.weight * float(found.excess @ found.excess) for skin, found in self._found(state))
+        return sum(found.skin.weight * float(found.excess @ found.excess) for found in self._found(state))
 
     def gradient(self, state: PoseState) -> FloatArray:
         result = np.zeros(len(state.theta))
-        for skin, found in self._found(state):
-            forces = 2.0 * skin.weight * found.excess[:, None] * found.along
-            result += state.pull(skin.track.rows(found.rows), forces)
+        for found in self._found(state):
+            forces = 2.0 * found.skin.weight * found.excess[:, None] * found.along
+            result += state.pull(found.track, forces)
         return result
 
     def normal_matrix(self, state: PoseState) -> FloatArray:
         result = np.zeros((len(state.theta), len(state.theta)))
-        for skin, found in self._found(state):
-            along = np.einsum("ki,kid->kd", found.along, state.jacobian(skin.track.rows(found.rows)))
-            result += 2.0 * skin.weight * along.T @ along
+        for found in self._found(state):
+            along = np.einsum("ki,kid->kd", found.along, state.jacobian(found.track))
+            result += 2.0 * found.skin.weight * along.T @ along
         return result
 
-    def _found(self, state: PoseState) -> list[tuple[_Edges, _TooLong]]:
-        """Per skin what is too long, found once per state."""
-        kept: list[tuple[_Edges, _TooLong]] | None = state.memory.get(self)
+    def _found(self, state: PoseState) -> list[_TooLong]:
+        """Per skin that has any, what is too long; found once per state."""
+        kept: list[_TooLong] | None = state.memory.get(self)
         if kept is None:
-            kept = [(skin, self._too_long(state, skin)) for skin in self.skins]
+            kept = [found for found in (self._too_long(state, skin) for skin in self.skins) if len(found.rows)]
             state.memory[self] = kept
         return kept
 
     def _too_long(self, state: PoseState, skin: _Edges) -> _TooLong:
         vectors = state.vectors(skin.track)
-        lengths = np.linalg.norm(vectors, axis=1)
-        excess = lengths / skin.lengths - self.allowed
-        rows = np.flatnonzero(excess > 0.0)
-        return _TooLong(rows, excess[rows], vectors[rows] / (lengths * skin.lengths)[rows, None])
+        squares = np.einsum("ei,ei->e", vectors, vectors)
+        rows = np.flatnonzero(squares > skin.free)
+        lengths, rest = np.sqrt(squares[rows]), skin.lengths[rows]
+        return _TooLong(skin, rows, lengths / rest - self.allowed, vectors[rows] / (lengths * rest)[:, None])
 
 
 def stretching_edges(rig: Rig, count: int) -> tuple[IntArray, float]:

@@ -13,11 +13,11 @@ from typing import Any
 
 from contact_core.atomic_file import replacing, write_atomic
 from contact_core.errors import FileRefused, InvalidInput
-from contact_core.geometry.warm_up import warm_up
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.registry import RENDERERS
 from contact_core.plugins.slots import Renderer
 from contact_core.progress import NO_PROGRESS, Progress
+from contact_core.solve.warm_up import warm_up
 from contact_gallery.figures import ORDER
 from contact_gallery.page import page
 from contact_gallery.sheet import Row, Sheet

@@ -11,7 +11,8 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import InvalidInput
 from contact_core.rig.capsules import fit_capsules
 from contact_core.rig.rig import Rig
-from contact_core.rig.skinning import Track, joint_track
+from contact_core.rig.skinning import joint_track
+from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import PairedPoints
 from contact_core.solve.state import PoseState
@@ -93,8 +94,7 @@ def _centre_of_mass(rig: Rig, first_bone: int) -> Track:
     lengths = np.linalg.norm(capsules.ends[:, 1] - capsules.ends[:, 0], axis=1)
     volumes = np.pi * capsules.radii**2 * (lengths + 4.0 / 3.0 * capsules.radii)
     middles = joint_track(capsules.joints, capsules.ends.mean(axis=1), first_bone)
-    shares = volumes / volumes.sum()
-    return Track(middles.bones, shares[None] @ middles.matrix, middles.width)
+    return middles.summed(volumes / volumes.sum())
 
 
 def _bearing(problem: PoseProblem, contact: PairedPoints, up: FloatArray) -> FloatArray:

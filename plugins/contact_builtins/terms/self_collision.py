@@ -10,7 +10,8 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.rig.capsules import closest_on_segments, fit_capsules
-from contact_core.rig.skinning import Track, joint_track
+from contact_core.rig.skinning import joint_track
+from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.state import PoseState

@@ -20,8 +20,8 @@ import pytest
 from contact_core.document.document import ContactDocument
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.document.schema import document_to_json
-from contact_core.geometry.warm_up import warm_up
 from contact_core.interaction.events import Key, Pointer
+from contact_core.solve.warm_up import warm_up
 
 pytest.importorskip("vtkmodules")
 pytest.importorskip("trame_rca")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from contact_core.errors import InvalidInput
-from contact_core.rig.skinning import Track
+from contact_core.rig.track import Track
 from contact_core.solve.body import PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
