@@ -100,10 +100,14 @@ class Chart:
         self._rotvec_dof, self._rotvec_joint, self._rotvec_component = rows.T
         self._rotvec_joints = np.unique(self._rotvec_joint)
         self._hinges = [j for j, freedom in enumerate(self.rig.freedoms) if freedom.kind == "hinge"]
-        self._euler_joints = np.array(euler_joints, np.int64)
-        self._euler_dofs = np.array(
-            [np.arange(s.start, s.stop) for s in (self.rotation_slices[j] for j in euler_joints)], np.int64
-        ).reshape(-1, 3)
+        self._euler_by_order = {
+            order: (
+                np.array([j for j in euler_joints if self.rig.freedoms[j].order == order]),
+                np.array([np.arange(3) + self.rotation_slices[j].start for j in euler_joints
+                          if self.rig.freedoms[j].order == order]),
+            )
+            for order in sorted({self.rig.freedoms[j].order for j in euler_joints})
+        }  # fmt: skip
         movers = [(s.start, j) for j, s in enumerate(self.translation_slices) if s.stop > s.start]
         self._moving_joints = np.array([j for _, j in movers], np.int64)
         self._moving_dofs = np.array([[s, s + 1, s + 2] for s, _ in movers], np.int64).reshape(-1, 3)
@@ -221,8 +225,8 @@ class Chart:
             r = turned[j]
             vectors[j, 0] = np.arctan2(r[2, 1] - r[1, 2], r[1, 1] + r[2, 2])
         theta[self._rotvec_dof] = vectors[self._rotvec_joint, self._rotvec_component]
-        for j, dofs in zip(self._euler_joints, self._euler_dofs, strict=True):
-            theta[dofs] = _euler_angles(turned[j], self.rig.freedoms[j].order)
+        for order, (joints, dofs) in self._euler_by_order.items():
+            theta[dofs] = _euler_angles(turned[joints], order)
         theta = self.coupled(theta)  # what a pose bends a follower otherwise is left over
         leftover = np.linalg.inv(self.turns(theta)[0]) @ relative
         scale = max(1.0, float(np.abs(self.rig.rest_local[:, :3, 3]).max(initial=0.0)))
@@ -266,10 +270,10 @@ def _rotation_vectors(rotations: FloatArray) -> FloatArray:
     return np.asarray(Rotation.from_matrix(rotations).as_rotvec()) if len(rotations) else np.zeros((0, 3))
 
 
-def _euler_angles(rotation: FloatArray, order: str) -> FloatArray:
-    """(3,) intrinsic Euler angles of a rotation (3, 3); in gimbal lock any split of the two turns is right."""
+def _euler_angles(rotations: FloatArray, order: str) -> FloatArray:
+    """(k, 3) intrinsic Euler angles of rotations (k, 3, 3); in gimbal lock any split of two turns is right."""
     from scipy.spatial.transform import Rotation
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        return np.asarray(Rotation.from_matrix(rotation).as_euler(order))
+        return np.asarray(Rotation.from_matrix(rotations).as_euler(order))

@@ -1,4 +1,4 @@
-"""Rotations in batches: the exponential map with its derivative, and the turns of Euler chains."""
+"""Rotations in batches: the exponential map with its derivative, and the nearest rotation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import FloatArray
 
 
 def cross_matrices(v: FloatArray) -> FloatArray:
@@ -38,22 +38,6 @@ def exponential(v: FloatArray) -> tuple[FloatArray, FloatArray]:
     kk = k @ k
     identity = np.eye(3)
     return identity + a * k + b * kk, identity + b * k + c * kk
-
-
-def euler_chain(angles: FloatArray, axes: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Intrinsic Euler rotations R = R1 R2 R3 (k, 3, 3) and the world axes of the three turns as columns.
-
-    angles: (k, 3) radians. axes: (k, 3) which coordinate axis (0, 1, 2) each turn is about.
-    Column i of the second answer is the axis about which R turns when angle i grows.
-    """
-    axis = np.eye(3)[axes]  # (k, 3, 3) a row per turn
-    turns = exponential((angles[:, :, None] * axis).reshape(-1, 3))[0].reshape(-1, 3, 3, 3)
-    first, second = turns[:, 0], turns[:, 0] @ turns[:, 1]
-    turning = np.stack(
-        [axis[:, 0], np.einsum("kab,kb->ka", first, axis[:, 1]), np.einsum("kab,kb->ka", second, axis[:, 2])],
-        axis=-1,
-    )
-    return second @ turns[:, 2], turning
 
 
 @lru_cache(maxsize=64)

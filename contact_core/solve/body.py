@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -118,12 +119,19 @@ def manipulator_length(rig: Rig, joints: IntArray | None = None) -> float:
     A vertex belongs to the joint that holds it strongest. This is the length that contacts are judged
     against: a body's hand is measured by the hand, not by the body.
     """
-    points = rig.surface.points
-    if joints is not None:
-        owner = rig.skin_joints[np.arange(len(points)), rig.skin_weights.argmax(axis=1)]
-        driven = np.isin(owner, joints)
-        points = points[driven] if driven.any() else points
-    return diameter(points)
+    kept = _lengths.setdefault(rig, {})
+    key = None if joints is None else joints.tobytes()
+    if key not in kept:
+        points = rig.surface.points
+        if joints is not None:
+            owner = rig.skin_joints[np.arange(len(points)), rig.skin_weights.argmax(axis=1)]
+            driven = np.isin(owner, joints)
+            points = points[driven] if driven.any() else points
+        kept[key] = diameter(points)
+    return kept[key]
+
+
+_lengths: WeakKeyDictionary[Rig, dict[bytes | None, float]] = WeakKeyDictionary()  # a hull takes as long as a step
 
 
 def uniform_scale(transform: FloatArray) -> float:
