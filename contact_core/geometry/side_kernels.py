@@ -52,6 +52,34 @@ def number_edges(
 
 
 @kernel
+def number_pieces(a: IntArray, b: IntArray, piece: IntArray) -> int:
+    """Write piece (f,), on entry (0, 1, 2 ...): the connected piece of each face, numbered by first faces, where
+    faces a and b (m,) are neighbours; returns how many there are. Union-find with halved paths (Tarjan)."""
+    for i in range(len(a)):
+        x, y = a[i], b[i]
+        while piece[x] != x:
+            piece[x] = piece[piece[x]]
+            x = piece[x]
+        while piece[y] != y:
+            piece[y] = piece[piece[y]]
+            y = piece[y]
+        if x < y:  # the least face of a piece is its root
+            piece[y] = x
+        else:
+            piece[x] = y
+    pieces = 0
+    for f in range(len(piece)):  # a root comes before all others of its piece
+        if piece[f] == f:
+            piece[f] = -1 - pieces
+            pieces += 1
+        else:
+            piece[f] = piece[piece[f]]
+    for f in range(len(piece)):
+        piece[f] = -1 - piece[f]
+    return pieces
+
+
+@kernel
 def vector_areas(points: FloatArray, face: IntArray, tail: IntArray, head: IntArray, area: FloatArray) -> None:
     """Write area (f, 3): twice the vector area of each polygon (Newell). Sides come face after face."""
     before = np.int64(-1)

@@ -245,13 +245,15 @@ def _wound(joining: _Joining) -> tuple[Winding, IntArray]:
     while True:
         met = sides.between(label)
         winding = wound_alike(met, faces, own)
+        if not len(pairs) or not winding.against.any():
+            return winding, label
         edge, count = met.edges
         several = np.zeros(len(count), bool)
         one = np.full(len(count), -1)
         one[edge] = own
         several[edge[one[edge] != own]] = True
         wrong = several & (np.bincount(edge, winding.against, len(count)) > 0)
-        if not wrong.any() or not len(pairs):
+        if not wrong.any():
             return winding, label
         pairs = without(pairs, met, edge, wrong)
         label = joined_points(len(label), sides, joining.group, pairs)

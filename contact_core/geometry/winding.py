@@ -36,7 +36,10 @@ def wound_alike(sides: Sides, faces: int, own_edge: IntArray) -> Winding:
     a, b = sides.face[one], sides.face[other]
     differ = (sides.tail[one] == sides.tail[other]) & (a != b)
     if not differ.any():
-        _, piece = connected_components(_graph(a, b, np.ones(len(a)), faces), directed=False)
+        from contact_core.geometry.side_kernels import number_pieces
+
+        piece = np.arange(faces)
+        number_pieces(a, b, piece)
         return Winding(np.zeros(faces, bool), piece, np.zeros(len(edge), bool))
     weight = np.where(own_edge[one] == own_edge[other], 1.0, np.where(differ, 3.0, 2.0))
     turned, piece = _along_tree(a, b, differ, weight, faces)

@@ -314,3 +314,22 @@ def test_points_of_different_labels_stay_apart() -> None:
     own = np.repeat(points.reshape(-1, 3, 3).mean(axis=1)[:, 2] > 0, 3).astype(np.int64)
     assert report(made_sound(points, faces, apart=label)[0]).is_watertight  # equal points, equal labels
     assert report(made_sound(points, faces, apart=own)[0]).components == 2
+
+
+@settings(deadline=None)
+@given(st.integers(1, 30), st.lists(st.tuples(st.integers(0, 29), st.integers(0, 29)), max_size=60))
+def test_pieces_are_those_of_a_graph(faces: int, joined: list[tuple[int, int]]) -> None:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    from contact_core.geometry.side_kernels import number_pieces
+
+    a, b = (
+        np.array([pair for pair in joined if max(pair) < faces] or np.zeros((0, 2)), np.int64)
+        .reshape(-1, 2)
+        .T.copy()
+    )
+    piece = np.arange(faces)
+    count, wanted = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(faces, faces)), directed=False)
+    assert number_pieces(a, b, piece) == count
+    assert (piece == wanted).all()
