@@ -78,6 +78,11 @@ class Surface:
         if min(self.points, self.faces) < 0:
             raise InvalidInput(f"{self.name!r} cannot have {self.points} points and {self.faces} faces.")
 
+    def told(self, length: float) -> str:
+        """A length in this surface's units for a person to read: "4.2 mm", "1.35 m"."""
+        meters = length * self.meters_per_unit
+        return f"{meters:.3g} m" if meters >= 0.9995 else f"{1e3 * meters:.3g} mm"
+
     @property
     def carrier_digest(self) -> str:
         """Of the mesh that contacts run on: its proxy's, where it has one."""

@@ -43,10 +43,8 @@ class Proposing:
             return ""
         if self.suggestions:
             return self._suggested
-        residuals = self.proposal.after.patches.values()
-        worst = max((residual.p95 for residual in residuals), default=0.0)
         what = "stopped, the best so far" if self.is_cut_short else "proposed"
-        return f"{what}: contacts within {worst:.3g}; Enter keeps it, Escape leaves it"
+        return f"{what}: contacts within {self.proposal.nearness}; Enter keeps it, Escape leaves it"
 
     @property
     def is_cut_short(self) -> bool:

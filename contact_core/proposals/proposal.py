@@ -71,6 +71,12 @@ class Proposal(Ghost):
         """By surface, the poses that it proposes (those of the last frame)."""
         return self.ghost.poses
 
+    @property
+    def nearness(self) -> str:
+        """How near 95 % of the points of the pair that is worst came, with a unit: "4.2 mm"."""
+        worst = max((each.p95 for each in self.after.patches.values()), default=0.0)
+        return self.ghost.surface(self.after.problem.bodies[0].name).told(worst)  # whose units the problem has
+
 
 @dataclass(frozen=True, eq=False)
 class SolveSettings:

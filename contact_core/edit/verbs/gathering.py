@@ -52,7 +52,8 @@ class GatheringVerbs(PaintingVerbs):
         """Paint each touching part as a patch: name, name.2 ...; returns the names. InvalidInput for none."""
         parts = self._geometry.touching(surface, other, distance, smallest=smallest)
         if not parts:
-            raise InvalidInput(f"nothing of {surface!r} lies within {distance:g} of {other!r} in this pose.")
+            told = self._document.surface(surface).told(distance)
+            raise InvalidInput(f"nothing of {surface!r} lies within {told} of {other!r} in this pose.")
         return self._mended([surface], lambda verbs: verbs._paint_parts(name, surface, parts, generator))
 
     def _paint_parts(

@@ -161,7 +161,8 @@ class PaintingVerbs(VerbGroup):
             here = self._geometry.points(patch).positions(mesh)
             indices = np.flatnonzero(nearest(here, near.positions(mesh)) <= radius)
             if not len(indices):
-                raise CommandRejected(f"no point of {patch!r} lies within {radius:g} of there.")
+                told = self._document.surface(self._document.patch(patch).surface).told(radius)
+                raise CommandRejected(f"no point of {patch!r} lies within {told} of there.")
         self._editor.do(Erase(patch, self._point_indices(patch, indices)))
 
     def merge(self, patch: str, others: Sequence[str]) -> None:

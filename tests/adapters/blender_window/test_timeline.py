@@ -45,3 +45,51 @@ def test_bars_and_keys_are_drawn(window: Window) -> Iterator[Any]:
         near = abs(after[part].astype(int) - wanted).max(axis=2) < 40
         assert near.sum() > 200, f"nothing of {wanted} in the timeline"
     assert (before[part] != after[part]).any() and session.timeline.spans(thumb)
+    scale = bpy.context.preferences.system.ui_scale
+
+    def place(frame: float, lane: float) -> tuple[int, int]:
+        """Window pixels."""
+        across = region.view2d.view_to_region(frame, 0.0, clip=False)[0]
+        return round(region.x + across), round(region.y + (22.0 + 18.0 * lane) * scale)
+
+    x, low = place(6.0, made.lanes.index(thumb))  # under the name of the pair, where its ramp rises
+    column = after[height - low - round(18.0 * scale) : height - low, x].astype(int)
+    assert (column.max(axis=1) - column.min(axis=1)).max() > 25, f"the name hides the bar: {column.tolist()}"
+    yield from clicks_go_to_frames(window, made, place, region)
+
+
+def clicks_go_to_frames(window: Window, made: Any, place: Any, region: Any) -> Iterator[Any]:
+    """A click on a curve goes to its frame, one elsewhere does not, and Blender's own selecting goes on with both."""
+    bpy = window.bpy
+    from contact_blender.compat import fcurves
+
+    armature = next(each for each in bpy.data.objects if each.type == "ARMATURE")
+    sheet = next(each for each in window.window.screen.areas if region in each.regions[:])
+    sheet.spaces.active.dopesheet.show_only_selected = False  # its keys in the rows of the sheet
+
+    def selected(put: bool | None = None) -> int:
+        """How many keys are selected; `put` selects all or none before."""
+        points = [point for curve in fcurves(armature) for point in curve.keyframe_points]
+        for point in points if put is not None else ():
+            point.select_control_point = put
+        return sum(point.select_control_point for point in points)
+
+    solid = [row for row, color in enumerate(made.segment_colors) if color[3] == 1.0]
+    middles = made.segments[solid].mean(axis=1)
+    frame, lane = min(middles, key=lambda each: abs(each[0] - 15.5))
+    bpy.context.scene.frame_set(3)
+    yield 3
+    yield from window.click(*place(frame, made.lanes.index("pose of human_hand") + 0.5))
+    yield 3
+    assert bpy.context.scene.frame_current == 3, "a click beside the curves is Blender's alone"
+    yield from window.click(*place(frame + 0.2, lane))
+    yield 3
+    assert bpy.context.scene.frame_current == round(frame + 0.2), "a click on a curve goes to its frame"
+    top = region.y + region.height - 50
+    for what, (x, y) in (("beside", place(13.0, len(made.lanes) + 1.0)), ("on", place(frame, lane))):
+        assert selected(False) == 0
+        yield 3
+        yield from window.drag([(x, y), (x + 6, y + 6), (x + 70, y + 20), (x + 70, (y + top) // 2), (x + 70, top)])
+        yield 3
+        window.said.append(f"{selected()} keys in the box that begins {what} a curve")
+        assert selected() > 0, f"no keys are in the box that begins {what} a curve"

@@ -9,7 +9,7 @@ from typing import Any
 
 from blender_driver import Window, in_window
 
-STEPS = 120  # tests/adapters/blender walks 300, without a window
+STEPS = 300  # some five minutes; tests/adapters/blender walks as far without a window
 
 
 @in_window

@@ -31,7 +31,7 @@ def register(package: str = __name__) -> None:
     if _registered:
         return
     warming.keep_kernels(package)
-    kinds = (*panel.groups(), *operators.classes(), *modal.CLASSES, *toolbar.classes(), *panel.PANELS)
+    kinds = (*panel.groups(), *operators.classes(), *modal.CLASSES, *film.CLASSES, *toolbar.classes(), *panel.PANELS)
     for kind in (*kinds, preferences.of(package)):
         bpy.utils.register_class(kind)
         _registered.append(kind)

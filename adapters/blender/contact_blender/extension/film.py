@@ -22,19 +22,42 @@ if TYPE_CHECKING:
     from contact_core.session import Session
 
 _LANE, _KEY, _ABOVE = 18.0, 4.5, 22.0  # pixels of a plain screen: a lane, half a key, and the scrollbar below
-_WORDS = 11.0
+_WORDS, _NEAR = 11.0, 6.0  # the same: letters, and how near a curve a click counts
 _handlers: list[Any] = []
+_items: list[Any] = []  # (keymap, item)
+
+
+class CONTACT_OT_film_go(bpy.types.Operator):  # noqa: N801 (Blender's spelling)
+    """Go to the frame of the curve under the pointer. Blender hears the press as well, and selects as always"""
+
+    bl_idname = "contact.film_go"
+    bl_label = "Go to Frame of Curve"
+    bl_options = {"INTERNAL"}  # noqa: RUF012 (Blender's spelling)
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        scale = float(context.preferences.system.ui_scale)
+        frame = frame_at(context, (event.mouse_region_x, event.mouse_region_y), scale)
+        if frame is not None:
+            context.scene.frame_set(frame)
+        return {"PASS_THROUGH"}  # nothing else: one that is finished ends Blender's waiting for a drag
 
 
 def register() -> None:
-    """Draw in every timeline from now on."""
+    """Draw in every timeline from now on, and hear presses there."""
     _handlers.append(bpy.types.SpaceDopeSheetEditor.draw_handler_add(draw, (), "WINDOW", "POST_PIXEL"))
+    config = bpy.context.window_manager.keyconfigs.addon
+    if config is not None:  # none without a window
+        found = config.keymaps.new(name="Dopesheet", space_type="DOPESHEET_EDITOR")
+        _items.append((found, found.keymap_items.new(CONTACT_OT_film_go.bl_idname, "LEFTMOUSE", "PRESS")))
 
 
 def unregister() -> None:
     """Draw no more."""
     while _handlers:
         bpy.types.SpaceDopeSheetEditor.draw_handler_remove(_handlers.pop(), "WINDOW")
+    while _items:
+        keymap, item = _items.pop()
+        keymap.keymap_items.remove(item)
 
 
 def redraw() -> None:
@@ -110,12 +133,38 @@ def shapes() -> FilmShapes | None:
     return found.shapes[1]
 
 
+CLASSES = (CONTACT_OT_film_go,)
+
+
+def frame_at(context: Any, place: tuple[float, float], scale: float) -> int | None:
+    """The whole frame of a measured curve next to pixels of a timeline, None where no curve is near."""
+    from contact_core.interaction.film_shapes import LIMIT
+
+    made = _shown(context)
+    if made is None or not len(made.segments):
+        return None
+    drawn = (made.segment_colors != LIMIT).any(axis=1)  # limits are lines, too
+    ends = _pixels(made.segments[drawn].reshape(-1, 2), context.region, scale).reshape(-1, 2, 2)
+    along, here = ends[:, 1] - ends[:, 0], np.array(place) - ends[:, 0]
+    share = (along * here).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-9)
+    away = np.linalg.norm(here - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1)
+    if not len(away) or away.min() > _NEAR * scale:
+        return None
+    return round(context.region.view2d.region_to_view(*place)[0])
+
+
+def _shown(context: Any) -> FilmShapes | None:
+    """What is drawn in a timeline, None for nothing."""
+    overlays = getattr(context.space_data, "overlays", None)
+    made = shapes() if getattr(overlays, "show_overlays", True) else None
+    return made if made is not None and made.lanes else None
+
+
 def draw() -> None:
     """Called by Blender for each timeline."""
     context = bpy.context
-    overlays = getattr(context.space_data, "overlays", None)
-    made = shapes() if getattr(overlays, "show_overlays", True) else None
-    if made is None or not made.lanes:
+    made = _shown(context)
+    if made is None:
         return
     scale = float(context.preferences.system.ui_scale)
     gpu.state.blend_set("ALPHA")
@@ -143,12 +192,13 @@ def _draw_ground(lanes: int, region: Any, scale: float) -> None:
 
 
 def _write_names(names: Sequence[str], scale: float) -> None:
-    """Over all else at the left of each lane, on dark ground, for a bar may begin there."""
+    """Over all else at the left of each lane, on dark ground, for a bar may begin there and shows through."""
     blf.size(0, _WORDS * scale)
     blf.color(0, 1.0, 1.0, 1.0, 0.95)
-    for place, name in enumerate(names):
-        low = (_ABOVE + place * _LANE) * scale
+    lows = [(_ABOVE + place * _LANE) * scale for place in range(len(names))]
+    for name, low in zip(names, lows, strict=True):
         _fill(*_box(0.0, low, blf.dimensions(0, name)[0] + 14.0 * scale, low + _LANE * scale, 0.55))
+    for name, low in zip(names, lows, strict=True):  # only now: writing leaves Blender's blending off
         blf.position(0, 8.0 * scale, low + 0.3 * _LANE * scale, 0.0)
         blf.draw(0, name)
 

@@ -389,6 +389,5 @@ def _accepted(session: Any, proposal: Any) -> str:
     """Accept a proposal and say how well the pairs are met."""
     session.accept(proposal)
     shared.keep_residuals(proposal)
-    worst = max((each.p95 for each in proposal.after.patches.values()), default=0.0)
     left_out = " ".join(f"{name} stays: {why}." for name, why in proposal.left_out.items())
-    return f"Solved ({proposal.after.message}): contacts within {worst:.3g}. {left_out}".strip()
+    return f"Solved ({proposal.after.message}): contacts within {proposal.nearness}. {left_out}".strip()
