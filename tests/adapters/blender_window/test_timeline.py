@@ -59,7 +59,7 @@ def test_bars_and_keys_are_drawn(window: Window) -> Iterator[Any]:
 
 
 def clicks_go_to_frames(window: Window, made: Any, place: Any, region: Any) -> Iterator[Any]:
-    """A click on a curve goes to its frame, one elsewhere does not, and Blender's own selecting goes on with both."""
+    """A click on a curve goes to its frame, one elsewhere does not, and Blender selects as always with both."""
     bpy = window.bpy
     from contact_blender.compat import fcurves
 

@@ -31,8 +31,8 @@ def register(package: str = __name__) -> None:
     if _registered:
         return
     warming.keep_kernels(package)
-    kinds = (*panel.groups(), *operators.classes(), *modal.CLASSES, *film.CLASSES, *toolbar.classes(), *panel.PANELS)
-    for kind in (*kinds, preferences.of(package)):
+    kinds = (*panel.groups(), *operators.classes(), *modal.CLASSES, *film.CLASSES, *toolbar.classes())
+    for kind in (*kinds, *panel.PANELS, preferences.of(package)):
         bpy.utils.register_class(kind)
         _registered.append(kind)
     bpy.types.WindowManager.contact = bpy.props.PointerProperty(type=panel.ContactSettings)
