@@ -1,4 +1,4 @@
-"""What the first drag would wait for, built beside the window: trees and normals, and what is solid."""
+"""What the first drag would wait for, made beside the window: kernels, trees and normals, and what is solid."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from contact_core.interaction.live import LiveSolve
 from contact_core.progress import Progress
 from contact_core.solve.penetration import RESOLUTION
 from contact_core.solve.problem import PoseProblem
+from contact_core.solve.warm_up import warm_up
 
 if TYPE_CHECKING:
     from contact_core.interaction.desk import Desk
@@ -31,6 +32,8 @@ def preparation(desk: Desk) -> Callable[[Progress], None]:
         problems = LiveSolve(desk).before_any_contact()
 
     def work(progress: Progress) -> None:
+        progress.tell(0.0, "kernels, compiled once on this machine")
+        warm_up()
         for number, (mesh, bends) in enumerate(surfaces):
             _prepare(mesh, bends=bends, progress=progress.part(*_share(number, len(surfaces), 0.0, 0.7)))
         for number, problem in enumerate(problems):
