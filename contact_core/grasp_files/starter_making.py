@@ -228,7 +228,7 @@ def _closed(hand: Hand, one: GraspType, object_from_palm: FloatArray, scene: Gra
     limits = np.array(one.closes)[None]
     way = object_from_palm[None, :3, 0] if one.palm else np.zeros((1, 3))
     closed = close_hands(hand, scene.field, object_from_rig[None], way, limits=limits)
-    return hand.pose(closed.placed[0], closed.angles[0], closed.starts[0]).local.copy()
+    return hand.pose(closed.placed[0], closed.angles[0], closed.turns[0]).local.copy()
 
 
 def _about(turn: FloatArray) -> FloatArray:

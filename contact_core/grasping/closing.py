@@ -11,13 +11,16 @@ from contact_core.geometry.distance_field import DistanceField
 from contact_core.grasping.hand import Hand
 
 TOUCH = 0.004  # of the hand's length: nearer than this is touching
+ON = 0.03  # hand lengths: pads of fingers that are nearer press, and say where the thumb goes
 FOUND = 0.02  # hand lengths: a digit that is farther from the object found nothing
 OPPOSE = 0.06  # hand lengths that it is worth that the thumb's side of the object is not the fingers'
+ALONG = 0.15  # hand lengths that it is worth that the thumb goes round what the fingers go round, not along it
 
 
 @dataclass(frozen=True, eq=False)
 class Closed:
-    """Hands as they closed, N of them. placed: (N, 4, 4) object_from_rig. angles: (N, B). starts: (N, D).
+    """Hands as they closed, N of them. placed: (N, 4, 4) object_from_rig. angles: (N, B). turns: (N, D, 3, 3) of
+    each digit's first bone that bends, before it bends.
 
     fits: (N, B, 8) of the pad below each bone: distance to the object, cosine between its normal and the object's
     outward one, that normal (3), its position (3). clear: (N, D) least signed distance of each digit. rest: (N,)
@@ -27,7 +30,7 @@ class Closed:
 
     placed: FloatArray
     angles: FloatArray
-    starts: IntArray
+    turns: FloatArray
     fits: FloatArray
     clear: FloatArray
     rest: FloatArray
@@ -47,6 +50,7 @@ def close_hands(
     curls: FloatArray | None = None,
     limits: FloatArray | None = None,
     oppose: float = OPPOSE,
+    along: float = ALONG,
 ) -> Closed:
     """Approach and close at each of `placed` (N, 4, 4) object_from_rig, rigid, in surface units that hand and
     object share.
@@ -62,7 +66,7 @@ def close_hands(
     bars = np.zeros((n, 7)) if bars is None else np.ascontiguousarray(bars, np.float64)
     curls = np.zeros(n) if curls is None else np.ascontiguousarray(curls, np.float64)
     limits = np.ones((n, digits)) if limits is None else np.ascontiguousarray(limits, np.float64)
-    angles, starts = np.zeros((n, bones)), np.zeros((n, digits), np.int64)
+    angles, turns = np.zeros((n, bones)), np.tile(np.eye(3), (n, digits, 1, 1))
     fits, clear = np.zeros((n, bones, 8)), np.zeros((n, digits))
     rest, palm, travel = np.zeros(n), np.zeros(n), np.zeros(n)
     close_all(
@@ -70,16 +74,17 @@ def close_hands(
         hand.low, hand.high, hand.flexes, hand.thumb, hand.starts, hand.start_counts, hand.start_angles,
         hand.start_prices, hand.probes, hand.probe_bones, hand.probe_starts, hand.levers, hand.tested,
         hand.tested_bones, hand.rest, hand.pads, hand.pad_normals, hand.has_pad, hand.capsules, hand.radii,
-        hand.room, field.values, field.origin, float(field.spacing), TOUCH * hand.length, float(hand.length),
-        float(oppose), angles, starts, fits, clear, rest, palm, travel, np.zeros((bones, 3, 3)), np.zeros(bones),
+        hand.room, field.values, field.origin, float(field.spacing), TOUCH * hand.length, ON, float(hand.length),
+        float(oppose), float(along), hand.looks, hand.look_frame, hand.look_low, hand.look_high, angles,
+        turns, fits, clear, rest, palm, travel, np.zeros((bones, 3, 3)), np.zeros(bones),
         np.zeros((bones, 3, 4)), np.zeros((bones, 2, 3)), np.zeros(digits, bool), np.zeros(bones, bool),
         np.zeros(bones, bool), np.zeros(bones), np.zeros(8), np.zeros(3), np.zeros(7), hand.firsts,
-        np.zeros(bones), hand.leads, hand.ratios,
+        np.zeros(bones), hand.leads, hand.ratios, np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.eye(3),
     )  # fmt: skip
     angles = hand.coupled(angles)
     whole = np.tile(np.eye(4), (n, 1, 1))
     whole[:, :3, :] = frames
-    return Closed(whole, angles, starts, fits, clear, rest, palm, travel)
+    return Closed(whole, angles, turns, fits, clear, rest, palm, travel)
 
 
 def relaxed(hand: Hand, closed: Closed) -> Closed:

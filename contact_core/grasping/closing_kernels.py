@@ -289,6 +289,72 @@ def clearance(
     return least
 
 
+@inlined
+def turned_root(out: FloatArray, frame: FloatArray, x: float, y: float) -> None:
+    """out (3, 3) = frame @ turn about x @ turn about y @ frame.T, frame (3, 3)."""
+    cx, sx, cy, sy = np.cos(x), np.sin(x), np.cos(y), np.sin(y)
+    for i in range(3):
+        f0, f1, f2 = frame[i, 0], frame[i, 1], frame[i, 2]
+        a = f0 * cy + (f1 * sx - f2 * cx) * sy
+        b = f1 * cx + f2 * sx
+        c = f0 * sy - (f1 * sx - f2 * cx) * cy
+        for j in range(3):
+            out[i, j] = a * frame[j, 0] + b * frame[j, 1] + c * frame[j, 2]
+
+
+@inlined
+def between(prices: FloatArray, counts: IntArray, low: FloatArray, high: FloatArray, at: FloatArray) -> float:
+    """Trilinear in prices of a grid with so many nodes each way (flat, the last way fastest) from low to high."""
+    total = 0.0
+    for corner in range(8):
+        place, share = ZERO, 1.0
+        for axis in range(3):
+            side = (corner >> axis) & 1
+            g = (at[axis] - low[axis]) / (high[axis] - low[axis]) * (counts[axis] - 1)
+            g = min(max(g, 0.0), counts[axis] - 1.0)
+            cell = min(np.int64(g), counts[axis] - 2)
+            share *= g - cell if side else 1.0 - (g - cell)
+            place = place * counts[axis] + cell + side
+        total += share * prices[place]
+    return total
+
+
+@kernel
+def misfit_of(
+    d: int, least: float, price: float, bones: IntArray, frames: FloatArray, pads: FloatArray, pad_normals:
+    FloatArray, has_pad: BoolArray, capsules: FloatArray, values: FloatArray, origin: FloatArray, spacing: float,
+    bar: FloatArray, length: float, oppose: float, along: float, mean: FloatArray, normals: FloatArray,
+    is_thumb: bool, fit: FloatArray,
+) -> float:  # fmt: skip
+    """What is amiss with a closed digit, in hand lengths: skin in the object, pads off it, and of a thumb that it
+    does not press against the fingers (`mean`, their normal on the object) or lies along what they go round.
+
+    normals: (3, 3) the mean of n n^T of the object's normals under the fingers. A thumb is across a rod where its
+    tip points the way in which they vary; for a ball or a plate no way is better than another.
+    """
+    misfit = price - 3.0 * min(least, 0.0) / length
+    count, against = 0.0, 0.0
+    for b in range(bones[d], bones[d + 1]):
+        if has_pad[b]:
+            pad_fit(b, frames, pads, pad_normals, values, origin, spacing, bar, fit)
+            count += 1.0
+            misfit += abs(fit[0]) / length + TURNED * (1.0 + fit[1])
+            against += fit[2] * mean[0] + fit[3] * mean[1] + fit[4] * mean[2]
+    if is_thumb and count > 0.0:
+        misfit += oppose * max(against / count + 0.6, 0.0)
+        last = bones[d + 1] - 1
+        size, across = 1e-30, 0.0
+        for i in range(3):
+            u = moved(frames[last], capsules[last, 1], i) - moved(frames[last], capsules[last, 0], i)
+            fit[i] = u
+            size += u * u
+        for i in range(3):
+            for j in range(3):
+                across += fit[i] * normals[i, j] * fit[j]
+        misfit += along * max(1.0 - 3.0 * across / size, 0.0)
+    return misfit
+
+
 @kernel
 def close_all(
     placed: FloatArray, ways: FloatArray, bars: FloatArray, curls: FloatArray, limits: FloatArray, bones:
@@ -297,11 +363,13 @@ def close_all(
     FloatArray, probe_bones: IntArray, probe_starts: IntArray, levers: FloatArray, tested: FloatArray,
     tested_bones: IntArray, rest: FloatArray, pads: FloatArray, pad_normals: FloatArray, has_pad: BoolArray,
     capsules: FloatArray, radii: FloatArray, room: FloatArray, values: FloatArray, origin: FloatArray, spacing:
-    float, touch: float, length: float, oppose: float, out_angles: FloatArray, out_starts: IntArray, out_fits:
-    FloatArray, out_clear: FloatArray, out_rest: FloatArray, out_palm: FloatArray, out_travel: FloatArray, pres:
-    FloatArray, angles: FloatArray, frames: FloatArray, ends: FloatArray, done: BoolArray, going: BoolArray,
-    moves: BoolArray, best_angles: FloatArray, fit: FloatArray, mean: FloatArray, none: FloatArray, firsts:
-    IntArray, ceiling: FloatArray, leads: IntArray, ratios: FloatArray,
+    float, touch: float, on: float, length: float, oppose: float, along: float, looks: IntArray, look_frame:
+    FloatArray, look_low: FloatArray, look_high: FloatArray, out_angles: FloatArray, out_turns: FloatArray,
+    out_fits: FloatArray, out_clear: FloatArray, out_rest: FloatArray, out_palm: FloatArray, out_travel:
+    FloatArray, pres: FloatArray, angles: FloatArray, frames: FloatArray, ends: FloatArray, done: BoolArray, going:
+    BoolArray, moves: BoolArray, best_angles: FloatArray, fit: FloatArray, mean: FloatArray, none: FloatArray,
+    firsts: IntArray, ceiling: FloatArray, leads: IntArray, ratios: FloatArray, normals: FloatArray, at:
+    FloatArray, best_at: FloatArray, best_turn: FloatArray,
 ) -> None:  # fmt: skip
     """Approach and close a hand at every placement (see `closing.close_hands` for the arrays)."""
     digits = len(bones) - 1
@@ -328,45 +396,74 @@ def close_all(
             for b in range(bones[d], bones[d + 1]):
                 ceiling[b] = limits[n, d] * high[b]
         mean[0] = mean[1] = mean[2] = 0.0
+        pressing = 0.0
+        for i in range(3):
+            for j in range(3):
+                normals[i, j] = 0.0
         for turn in range(digits):
             d = turn if thumb < 0 else (turn + 1 if turn + 1 < digits else ZERO)  # digits in order, the thumb last
             first, end = bones[d], bones[d + 1]
             best = np.inf
-            chosen = ZERO
-            for s in range(start_counts[d]):
-                price = start_prices[d, s]
+            chosen, step, better = ZERO, 0.5, True
+            more = 6 * looks[3] if d == thumb and start_counts[d] > 1 else ZERO
+            # its starts, then of a thumb what is near the best of them, either way of each of three, in steps that
+            # halve
+            for tried in range(start_counts[d] + more):
+                price, near = 0.0, tried - start_counts[d]
                 for b in range(first, end):
                     moves[b] = flexes[b]
                     angles[b] = min(max(curls[n] * high[b], low[b]), high[b]) if flexes[b] and d != thumb else 0.0
-                for i in range(3):
-                    for j in range(3):
-                        pres[firsts[d], i, j] = starts[d, s, i, j]
+                if near < 0:
+                    price = start_prices[d, tried]
+                    for i in range(3):
+                        for j in range(3):
+                            pres[firsts[d], i, j] = starts[d, tried, i, j]
+                    if d == thumb:
+                        angles[firsts[d]] = start_angles[d, tried]
+                else:
+                    if near == 0:
+                        for k in range(2, -1, -1):
+                            best_at[k] = chosen % looks[k] * (look_high[k] - look_low[k]) / (looks[k] - 1.0)
+                            best_at[k] += look_low[k]
+                            chosen = chosen // looks[k]
+                    if near % 6 == 0:
+                        step = step if better else 0.5 * step
+                        better = False
+                    for k in range(3):
+                        at[k] = best_at[k]
+                    k = near % 6 // 2
+                    stride = step * (look_high[k] - look_low[k]) / (looks[k] - 1.0)
+                    at[k] = min(max(at[k] + (stride if near % 2 else -stride), look_low[k]), look_high[k])
+                    price = between(start_prices[d], looks, look_low, look_high, at)
+                    turned_root(pres[firsts[d]], look_frame, at[0], at[1])
+                    angles[firsts[d]] = at[2]
                 if d == thumb:
-                    angles[firsts[d]] = start_angles[d, s]
                     moves[firsts[d]] = False
                 least = close_digit(
                     d, placed[n], bones, links, pres, axes, ceiling, moves, angles, frames, probes, probe_bones,
                     probe_starts, levers, values, origin, spacing, bar, touch, capsules, radii, room, ends, done,
                     going, leads, ratios,
                 )  # fmt: skip
-                misfit = price - 3.0 * min(least, 0.0) / length
-                count, against = 0.0, 0.0
-                for b in range(first, end):
-                    if has_pad[b]:
-                        pad_fit(b, frames, pads, pad_normals, values, origin, spacing, bar, fit)
-                        count += 1.0
-                        misfit += abs(fit[0]) / length + TURNED * (1.0 + fit[1])
-                        against += fit[2] * mean[0] + fit[3] * mean[1] + fit[4] * mean[2]
-                if d == thumb and count > 0.0:  # the object's normals under thumb and fingers shall oppose
-                    misfit += oppose * max(against / count + 0.6, 0.0)
-                if misfit < best:
-                    best, chosen = misfit, s
+                misfit = misfit_of(
+                    d, least, price, bones, frames, pads, pad_normals, has_pad, capsules, values, origin, spacing,
+                    bar, length, oppose, along, mean, normals, d == thumb, fit,
+                )  # fmt: skip
+                if misfit < best - 1e-12:
+                    best, better = misfit, True
+                    if near < 0:
+                        chosen = tried
+                    else:
+                        for k in range(3):
+                            best_at[k] = at[k]
                     for b in range(first, end):
                         best_angles[b] = angles[b]
-            out_starts[n, d] = chosen
+                    for i in range(3):
+                        for j in range(3):
+                            best_turn[i, j] = pres[firsts[d], i, j]
             for i in range(3):
                 for j in range(3):
-                    pres[firsts[d], i, j] = starts[d, chosen, i, j]
+                    pres[firsts[d], i, j] = best_turn[i, j]
+                    out_turns[n, d, i, j] = best_turn[i, j]
             for b in range(first, end):
                 angles[b] = best_angles[b]
                 out_angles[n, b] = best_angles[b]
@@ -392,12 +489,18 @@ def close_all(
             for b in range(first, end):
                 if has_pad[b]:
                     pad_fit(b, frames, pads, pad_normals, values, origin, spacing, none, out_fits[n, b])
-                    if d != thumb:
+                    if d != thumb and abs(out_fits[n, b, 0]) < on * length:
+                        pressing += 1.0
                         for i in range(3):
                             mean[i] += out_fits[n, b, 2 + i]
+                            for j in range(3):
+                                normals[i, j] += out_fits[n, b, 2 + i] * out_fits[n, b, 2 + j]
             size = np.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
             if turn == digits - 2 and size > 0.0:
-                mean[0], mean[1], mean[2] = mean[0] / size, mean[1] / size, mean[2] / size
+                for i in range(3):
+                    mean[i] = mean[i] / size
+                    for j in range(3):
+                        normals[i, j] = normals[i, j] / pressing
         out_rest[n] = np.inf
         for p in range(len(rest)):
             out_rest[n] = min(out_rest[n], field_at(

@@ -20,6 +20,9 @@ FACES = -0.3  # n.n' of skin that presses on the object
 POINTS = 16  # of contact, for closure
 STRAIGHT = np.radians(40.0)  # all joints of a finger together: less is no bend that holds
 DIRECTIONS = 96
+ROUND = (
+    0.1  # by how much normals vary more across a thing than along it, as mean squares, where it is round for sure
+)
 LOOP_REACH = 0.2  # hand lengths from the place that is to be held to a finger through the loop there
 BACK = (0.06, 0.12, 0.2, 0.3)  # hand lengths of the way back out
 
@@ -97,6 +100,34 @@ def enclosure(normals: FloatArray, weights: FloatArray) -> FloatArray:
     along = np.einsum("nki,di->nkd", normals, ways)
     along = np.where(weights[:, :, None] > 0.0, along * weights[:, :, None], -1.0)
     return np.asarray(along.max(axis=1).min(axis=1))
+
+
+def along(normals: FloatArray, press: BoolArray, tip: FloatArray) -> FloatArray:
+    """(N,) 0 to 1: how much a thumb points along what the fingers go round: cos^2 of its angle to the way in which
+    the object's normals (N, k, 3) under pads that press (N, k) vary least. tip: (N, 3), of any length. 0 where
+    fingers go round nothing: under a flat hand normals do not vary, on a ball they vary in all ways."""
+    weighted = normals * press[:, :, None]
+    spread = np.einsum("nbi,nbj->nij", weighted, weighted) / np.maximum(press.sum(axis=1), 1)[:, None, None]
+    vary, ways = np.linalg.eigh(spread)
+    unit = tip / np.maximum(np.linalg.norm(tip, axis=1), 1e-30)[:, None]
+    sure = np.clip((vary[:, 1] - vary[:, 0]) / ROUND, 0.0, 1.0)
+    return np.asarray(sure * np.einsum("ni,ni->n", unit, ways[:, :, 0]) ** 2)
+
+
+def thumb_along(hand: Hand, skin: FloatArray, world: FloatArray, mesh: TriangleMesh) -> float:
+    """`along` of the thumb of a posed hand, by the object's mean normals under each bone of the fingers that
+    touches; 0 without a thumb. skin: (n, 3), world: (j, 4, 4), in the object's space."""
+    if hand.thumb < 0:
+        return 0.0
+    found = Locator.of(mesh).closest(skin, max_distance=TOUCHES * hand.length)
+    near = np.flatnonzero(found.found & (hand.bone_of_skin >= hand.bones[hand.thumb + 1]))
+    sums = np.zeros((len(hand.joints), 3))
+    np.add.at(sums, hand.bone_of_skin[near], mesh.face_normals[found.points.faces[near]])
+    size = np.linalg.norm(sums, axis=1)
+    press = (size > 0.0) & hand.flexes
+    last = int(hand.bones[hand.thumb + 1]) - 1
+    tip = world[hand.joints[last], :3, :3] @ np.diff(hand.capsules[last], axis=0)[0]
+    return float(along((sums / np.maximum(size, 1e-30)[:, None])[None], press[None], tip[None])[0])
 
 
 def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray) -> float:

@@ -25,6 +25,7 @@ from contact_core.grasping.facts import (
     opposition,
     skin_through,
     through_loops,
+    thumb_along,
     uneven_curl,
 )
 from contact_core.grasping.metrics import measure
@@ -190,6 +191,7 @@ def judged(
         "skin_through": float(skin_through(hand, posed.points, world, scene.mesh).max()) / hand.length,
         "uneven_curl_deg": float(np.degrees(uneven_curl(hand, angles, used & touching))),
         "opposition_deg": float(np.degrees(opposition(hand, posed.points, scene.mesh, used))),
+        "thumb_along": thumb_along(hand, posed.points, world, scene.mesh),
         "crossing": crossing(hand, world),
         "digits_through": _digits_through(scene, world),
         "closure": closure(contact_wrenches(posed, scene.mesh, hand.length)),

@@ -25,7 +25,12 @@ FREE = np.radians(100.0)  # how far joints without limits bend
 STIFF = np.radians(5.0)  # a joint with less room than this does not bend
 SPREADS = np.radians([0.0, -10.0, 10.0])  # of fingers
 SPREAD_PRICE = 0.004  # hand lengths for ten degrees
-TWISTS, THUMB_SPREADS, THUMB_FLEXIONS = (0.05, 0.35, 0.65), (0.1, 0.36, 0.63, 0.9), (0.1, 0.4, 0.7)  # of its room
+TWISTS, THUMB_SPREADS, THUMB_FLEXIONS = (
+    np.linspace(0.05, 0.95, 3),
+    np.linspace(0.1, 0.9, 4),
+    np.linspace(0.1, 0.7, 3),
+)
+LOOKS = 4  # rounds in which a thumb looks about the best of these shares of its room, one way after the other
 STRETCHED, STRETCH_PRICE = 1.3, 0.12  # skin that is stretched more costs so many hand lengths for as much again
 WRIST = 0.12  # of the hand's length: skin this far behind the joint at which the digits part is no palm
 
@@ -39,7 +44,9 @@ class Hand:
     starts: (D, S, 3, 3) turns of a digit's first bone to try, with angles and prices (D, S); counts (D,).
     probes: points of skin, by digit; tested: palm and fingers for the approach; rest: skin that is neither.
     pads: (B, 3) their middles and normals. length: of the hand. leads: (B,) the bone with which each turns,
-    `ratios` (B,) times as much, where a robot couples them, -1 for none.
+    `ratios` (B,) times as much, where a robot couples them, -1 for none. looks: (4,) how many of a thumb's starts
+    each way (twist, spread, flexion), and rounds to look about the best; look_low, look_high: (3,) radians from the
+    first to the last each way, in look_frame (3, 3) of its first bone that bends.
     """
 
     rig: Rig
@@ -71,6 +78,10 @@ class Hand:
     length: float
     leads: IntArray
     ratios: FloatArray
+    looks: IntArray
+    look_frame: FloatArray
+    look_low: FloatArray
+    look_high: FloatArray
     thumb: int = field(default=-1)
 
     @cached_property
@@ -149,24 +160,34 @@ class Hand:
 
     @cached_property
     def quick(self) -> Hand:
-        """The same with one start for each digit, for a first look."""
-        return replace(self, start_counts=np.ones_like(self.start_counts))
+        """The same for a first look: one start for each finger, and of a thumb's two, spread far to either side."""
+        counts, looks = np.ones_like(self.start_counts), self.looks.copy()
+        looks[3] = 0
+        arrays = {name: getattr(self, name).copy() for name in ("starts", "start_angles", "start_prices")}
+        if looks[:3].min() > 1:
+            counts[self.thumb] = 2
+            twist, flexion = looks[0] // 2, looks[2] // 2
+            for place, spread in enumerate((0, looks[1] - 1)):
+                own = (twist * looks[1] + spread) * looks[2] + flexion
+                for name, array in arrays.items():
+                    array[self.thumb, place] = getattr(self, name)[self.thumb, own]
+        return replace(self, start_counts=counts, looks=looks, **arrays)
 
-    def pose(self, placed: FloatArray, angles: FloatArray, starts: IntArray) -> Pose:
-        """The pose of the whole rig with the hand at `placed` (4, 4) in rig space; angles (B,), starts (D,)."""
+    def pose(self, placed: FloatArray, angles: FloatArray, turns: FloatArray) -> Pose:
+        """The pose of the whole rig with the hand at `placed` (4, 4) in rig space; angles (B,), turns (D, 3, 3)."""
         local = self.rig.rest_local.copy()
         for digit in range(len(self.bones) - 1):
             for b in range(self.bones[digit], self.bones[digit + 1]):
                 turn = turn_about(self.axes[b], angles[b])
                 if b == self.firsts[digit]:
-                    turn = self.starts[digit, starts[digit]] @ turn
+                    turn = turns[digit] @ turn
                 local[self.joints[b], :3, :3] = local[self.joints[b], :3, :3] @ turn
         roots = self.rig.parents < 0
         local[roots] = placed @ local[roots]
         return Pose(self.rig.joints, local)
 
-    def frames(self, placed: FloatArray, angles: FloatArray, starts: IntArray) -> FloatArray:
-        """(N, B, 4, 4) of all bones of N hands at `placed` (N, 4, 4); angles (N, B), starts (N, D)."""
+    def frames(self, placed: FloatArray, angles: FloatArray, turns: FloatArray) -> FloatArray:
+        """(N, B, 4, 4) of all bones of N hands at `placed` (N, 4, 4); angles (N, B), turns (N, D, 3, 3)."""
         n = len(placed)
         result = np.zeros((n, len(self.joints), 4, 4))
         for digit, (first, end) in enumerate(zip(self.bones[:-1], self.bones[1:], strict=True)):
@@ -175,7 +196,7 @@ class Hand:
                 turn = np.tile(np.eye(4), (n, 1, 1))
                 turn[:, :3, :3] = [turn_about(self.axes[b], angle) for angle in angles[:, b]]
                 if b == self.firsts[digit]:
-                    turn[:, :3, :3] = self.starts[digit, starts[:, digit]] @ turn[:, :3, :3]
+                    turn[:, :3, :3] = turns[:, digit] @ turn[:, :3, :3]
                 link = np.vstack([self.links[b], [0.0, 0.0, 0.0, 1.0]])
                 before = result[:, b] = before @ link @ turn
         return result
@@ -214,6 +235,7 @@ def hand_of(rig: Rig, description: HandDescription, seed: int = 0) -> Hand:
     probes, probe_bones, probe_starts = _probes(rig, digits, counts, carrier, seed)
     tested, tested_bones, rest = _tested(rig, description, carrier, digit_joints, length, seed)
     starts = [_starts(rig, digit) for digit in digits]
+    looks, *look = _looks(rig, digits[0])
     most = max(len(turns) for turns, _, _ in starts)
     pads = _pads(rig, description, joints)
     axes = np.array([axis for axis, _, _ in bends])
@@ -230,7 +252,8 @@ def hand_of(rig: Rig, description: HandDescription, seed: int = 0) -> Hand:
         probes=probes, probe_bones=probe_bones, probe_starts=probe_starts,
         levers=_levers(rig, probes, probe_bones, counts, joints), tested=tested, tested_bones=tested_bones,
         rest=rest, pads=pads[0], pad_normals=pads[1], has_pad=pads[2], capsules=capsules, radii=radii, room=room,
-        length=length, thumb=thumb, leads=leads, ratios=ratios,
+        length=length, thumb=thumb, leads=leads, ratios=ratios, looks=looks, look_frame=look[0], look_low=look[1],
+        look_high=look[2],
     )  # fmt: skip
 
 
@@ -275,7 +298,7 @@ def _coupling(rig: Rig, joints: IntArray, axes: FloatArray) -> tuple[IntArray, F
 
 def _starts(rig: Rig, digit: Digit) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Turns (s, 3, 3) of a digit's first bending bone to try before it closes, with flexions and prices (s,)."""
-    first = next((bone for bone in digit.bones if _bend(rig.freedoms[bone.joint], bone)[2] > STIFF), digit.bones[0])
+    first = _first_bending(rig, digit)
     freedom = rig.freedoms[first.joint]
     if freedom.kind not in ("euler", "ball"):
         return np.eye(3)[None], np.zeros(1), np.zeros(1)
@@ -293,6 +316,22 @@ def _starts(rig: Rig, digit: Digit) -> tuple[FloatArray, FloatArray, FloatArray]
         whole.append(turns[-1] @ frame @ turn_about(np.eye(3)[2], z) @ frame.T)
     stretch = stretches(rig, first.joint, np.array(whole))
     return np.array(turns), np.array(angles), STRETCH_PRICE * np.maximum(stretch - STRETCHED, 0.0)
+
+
+def _first_bending(rig: Rig, digit: Digit) -> DigitBone:
+    return next((bone for bone in digit.bones if _bend(rig.freedoms[bone.joint], bone)[2] > STIFF), digit.bones[0])
+
+
+def _looks(rig: Rig, digit: Digit) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    """How many starts a thumb has each way, and rounds beyond them (4,), in which frame (3, 3), from where to where
+    (3,) (3,)."""
+    shares, first = (TWISTS, THUMB_SPREADS, THUMB_FLEXIONS), _first_bending(rig, digit)
+    freedom = rig.freedoms[first.joint]
+    if not digit.is_thumb or freedom.kind not in ("euler", "ball"):
+        return np.array([1, 1, 1, 0]), np.eye(3), np.zeros(3), np.zeros(3)
+    lower, upper = _room(freedom, first.frame)
+    low, high = (lower + np.array([each[k] for each in shares]) * (upper - lower) for k in (0, -1))
+    return np.array([*map(len, shares), LOOKS], np.int64), np.ascontiguousarray(first.frame), low, high
 
 
 def stretches(rig: Rig, joint: int, turns: FloatArray) -> FloatArray:

@@ -10,8 +10,8 @@ from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.transform import transform_points
-from contact_core.grasping.closing import TOUCH, Closed
-from contact_core.grasping.facts import STRAIGHT, enclosure
+from contact_core.grasping.closing import ON, TOUCH, Closed
+from contact_core.grasping.facts import STRAIGHT, along, enclosure
 from contact_core.grasping.hand import Hand, spread_out
 from contact_core.grasping.slots import Approaches
 
@@ -51,7 +51,8 @@ def first_look(hand: Hand, mesh: TriangleMesh, approaches: Approaches, closed: C
     value = value - np.where((around < -0.1) & ~sideways & (np.array(approaches.kinds) != "hook"), 0.3, 0.0)
     laid = np.clip((OPPOSED - opposed(hand, closed, used, touched)) / (0.5 * np.pi), 0.0, 1.0)
     value = value - 0.8 * np.where(sideways | (np.array(approaches.kinds) == "hook"), 0.0, laid)
-    if hand.thumb >= 0:  # where it takes part, it shall touch
+    if hand.thumb >= 0:  # where it takes part, it shall touch, and go round a thing with the fingers
+        value = value - 0.4 * np.where(used[:, hand.thumb], thumb_along(hand, closed, pads), 0.0)
         value = value - np.where(used[:, hand.thumb] & ~touches[:, hand.thumb], 0.5, 0.0)
     return np.where(np.isfinite(closed.travel), value, -np.inf)
 
@@ -59,7 +60,7 @@ def first_look(hand: Hand, mesh: TriangleMesh, approaches: Approaches, closed: C
 def bones_crossing(hand: Hand, mesh: TriangleMesh, closed: Closed) -> IntArray:
     """(N,) how many bones, metacarpals included, go through the object's surface: what a thin wall hides from
     distances."""
-    frames = hand.frames(closed.placed, closed.angles, closed.starts)
+    frames = hand.frames(closed.placed, closed.angles, closed.turns)
     ends = np.einsum("nbij,bej->nbei", frames[:, :, :3, :3], hand.capsules) + frames[:, :, None, :3, 3]
     firsts = frames[:, hand.firsts][:, :, :3, 3]  # (N, D, 3)
     hub = closed.placed @ np.append(hand.rig.rest_world[hand.description.hub, :3, 3], 1.0)
@@ -95,6 +96,15 @@ def opposed(hand: Hand, closed: Closed, used: BoolArray, touched: BoolArray) -> 
     none = np.isnan(angles).all(axis=1)
     angles[none] = 0.0
     return np.asarray(np.nanmedian(angles, axis=1))
+
+
+def thumb_along(hand: Hand, closed: Closed, pads: BoolArray) -> FloatArray:
+    """(N,) `facts.along` of the thumb, as pads (N, B) that take part tell it."""
+    fingers = np.arange(len(hand.joints)) >= hand.bones[hand.thumb + 1]
+    press = pads & fingers & (np.abs(closed.fits[:, :, 0]) < ON * hand.length)  # (N, B)
+    last = int(hand.bones[hand.thumb + 1]) - 1
+    frames = hand.frames(closed.placed, closed.angles, closed.turns)[:, last, :3, :3]
+    return along(closed.fits[:, :, 2:5], press, frames @ np.diff(hand.capsules[last], axis=0)[0])
 
 
 def uneven(hand: Hand, angles: FloatArray, used: BoolArray) -> FloatArray:

@@ -97,7 +97,7 @@ def _threaded(scene: GraspScene, closed: Closed) -> FloatArray:
     """(N,) what fingers through a loop at the place that is to be held are worth; nothing without a place."""
     if scene.at is None:
         return np.zeros(len(closed.placed))
-    frames = scene.hand.frames(closed.placed, closed.angles, closed.starts)
+    frames = scene.hand.frames(closed.placed, closed.angles, closed.turns)
     through = through_loops(scene.hand, frames, scene.field, scene.solid, scene.at)
     return np.asarray(THREADED * np.minimum(through.sum(axis=1), 4))
 

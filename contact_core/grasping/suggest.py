@@ -92,7 +92,7 @@ def _finished(
     """A closed hand as a solved document; None where too few pads find a place."""
     hand, draft = scene.hand, base.copy()
     in_rig = np.linalg.inv(scene.object_from_rig) @ closed.placed[0]
-    start = hand.pose(in_rig, closed.angles[0], closed.starts[0])
+    start = hand.pose(in_rig, closed.angles[0], closed.turns[0])
     draft.surfaces.set_pose(scene.hand_name, start)
     wanted = _taking_part(scene, approach, pads)
     return finished(scene, draft, wanted, proposed, approach.kinds[0], approach.used(hand)[0], score)

@@ -33,6 +33,7 @@ GOOD: dict[str, Any] = {
     "skin_through": 0.005,
     "uneven_curl_deg": 15.0,
     "opposition_deg": 150.0,
+    "thumb_along": 0.0,
     "crossing": 0.0,
     "digits_through": 0,
     "closure": 0.1,

@@ -22,6 +22,7 @@ class Balanced(HasSettings):
     hold: float = setting(0.6, low=0.0, help="what digits that touch and closure count")
     comfort: float = setting(0.7, low=0.0, help="what joints in the middle of their room and like bends count")
     loop: float = setting(0.25, low=0.0, help="what each finger through the loop at the place to hold counts")
+    along: float = setting(0.5, low=0.0, help="what a thumb costs that lies along what the fingers go round")
     clearance: float = setting(0.3, low=0.0, help="what a free way out counts")
 
     def score(self, facts: GraspFacts) -> float:
@@ -31,5 +32,7 @@ class Balanced(HasSettings):
         digits = m["digits_in_contact"] / max(m["digits_wanted"], 1)
         hold = 0.5 * digits + 0.5 * min(max(facts.closure, 0.0) / FIRM, 1.0)
         value = self.contact * contact + self.hold * hold + self.comfort * facts.comfort
+        if facts.kind not in ("pinch", "lateral"):
+            value -= self.along * m["thumb_along"]
         value += self.loop * min(m["digits_through"], 4)
         return float(value + self.clearance * facts.clearance - FAILURE * len(facts.failures))

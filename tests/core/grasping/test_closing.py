@@ -10,8 +10,10 @@ import pytest
 
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.grasping.closing import FOUND, TOUCH, Closed, close_hands, relaxed
-from contact_core.grasping.hand import Hand
+from contact_core.grasping.closing import ALONG, FOUND, TOUCH, Closed, close_hands, relaxed
+from contact_core.grasping.closing_kernels import between, turned_root
+from contact_core.grasping.hand import Hand, turn_about
+from contact_core.grasping.screening import thumb_along
 from contact_core.rig.rig import forward_kinematics
 from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
 
@@ -67,14 +69,14 @@ def test_joints_keep_their_limits() -> None:
 def test_where_all_stands_does_not_matter() -> None:
     here, there = closed_on("slab"), closed_on("slab", np.array([100.0, -30.0, 7.0]))
     assert np.abs(here.angles - there.angles).max() < np.radians(1.5)
-    assert np.array_equal(here.starts, there.starts)
+    assert np.abs(here.turns - there.turns).max() < 0.05
 
 
 def test_frames_are_those_of_the_pose() -> None:
     closed, one = closed_on("ball"), hand()
-    frames = one.frames(closed.placed, closed.angles, closed.starts)
+    frames = one.frames(closed.placed, closed.angles, closed.turns)
     for n in (0, N // 2):
-        pose = one.pose(closed.placed[n], closed.angles[n], closed.starts[n])
+        pose = one.pose(closed.placed[n], closed.angles[n], closed.turns[n])
         world = forward_kinematics(one.rig.parents, pose.local)
         assert np.allclose(world[one.joints], frames[n], atol=1e-9)
 
@@ -94,7 +96,7 @@ def test_a_limit_of_nothing_keeps_a_digit_open() -> None:
 def test_fingers_keep_out_of_one_another() -> None:
     """The capsules of different digits are nowhere nearer than they may be by more than one step."""
     closed, one = closed_on("rod"), hand()
-    frames = one.frames(closed.placed, closed.angles, closed.starts)
+    frames = one.frames(closed.placed, closed.angles, closed.turns)
     ends = np.einsum("nbij,bej->nbei", frames[:, :, :3, :3], one.capsules) + frames[:, :, None, :3, 3]
     step = 2.0 * np.radians(1.0) * one.levers.max()
     share = np.linspace(0.0, 1.0, 9)[:, None]
@@ -135,3 +137,52 @@ def test_coupled_bones_close_by_their_rule() -> None:
     closed = close_hands(robot, DistanceField.of(mesh, resolution=40), placed, ways)
     assert np.allclose(closed.angles[:, last], 0.6 * closed.angles[:, middle])
     assert (closed.angles[:, middle] > 0.2).any() and (closed.clear[:, 1] < TOUCH * one.length).any()
+
+
+def on_a_rod() -> tuple[Hand, np.ndarray, np.ndarray, DistanceField]:
+    one, mesh = hand(), thing("rod")
+    return one, *placements(one, mesh), DistanceField.of(mesh, resolution=40)
+
+
+def test_a_thumb_goes_round_a_rod_with_the_fingers_and_not_along_it() -> None:
+    one, placed, ways, field = on_a_rod()
+    pads = np.tile(one.has_pad, (N, 1))
+    along, near = [], []
+    for price in (0.0, ALONG):
+        closed = close_hands(one, field, placed, ways, along=price)
+        along.append(float(thumb_along(one, closed, pads).mean()))
+        near.append(float(np.abs(closed.clear[:, one.thumb]).mean()) / one.length)
+    assert along[1] < 0.8 * along[0], along
+    assert near[1] < near[0] + 0.01, "it touches as before"
+
+
+def test_a_thumb_looks_about_the_best_of_its_starts() -> None:
+    one, placed, ways, field = on_a_rod()
+    still = replace(one, looks=np.array([*one.looks[:3], 0]))
+    tip = int(one.bones[1]) - 1
+    gaps = []
+    for each in (still, one):
+        closed = close_hands(each, field, placed, ways, oppose=0.0, along=0.0)
+        fit = closed.fits[:, tip]
+        gaps.append(float((np.abs(fit[:, 0]) / one.length + 0.04 * (1.0 + fit[:, 1])).mean()))
+        root = one.firsts[one.thumb]
+        outside = (closed.angles[:, root] < one.look_low[2] - 1e-9) | (closed.angles[:, root] > one.look_high[2])
+        assert not outside.any(), "its root stays where its starts are"
+    assert gaps[1] < 0.9 * gaps[0], gaps
+
+
+def test_a_start_is_a_turn_of_the_chart_and_so_is_what_lies_between() -> None:
+    one = hand()
+    x, y = 0.3, -0.7
+    out = np.zeros((3, 3))
+    turned_root(out, one.look_frame, x, y)
+    expected = one.look_frame @ turn_about(np.eye(3)[0], x) @ turn_about(np.eye(3)[1], y) @ one.look_frame.T
+    assert np.allclose(out, expected, atol=1e-12)
+    prices = one.start_prices[one.thumb]
+    for place in (0, 7, len(prices) - 1):
+        node = np.array(np.unravel_index(place, one.looks[:3]))
+        at = one.look_low + node * (one.look_high - one.look_low) / (one.looks[:3] - 1)
+        assert between(prices, one.looks, one.look_low, one.look_high, at) == pytest.approx(prices[place])
+        turned_root(out, one.look_frame, at[0], at[1])
+        assert np.allclose(out, one.starts[one.thumb, place], atol=1e-9)
+        assert at[2] == pytest.approx(one.start_angles[one.thumb, place])

@@ -10,6 +10,7 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.grasping.closing import close_hands
 from contact_core.grasping.facts import (
+    along,
     closure,
     contact_wrenches,
     crossing,
@@ -18,6 +19,7 @@ from contact_core.grasping.facts import (
     opposition,
     skin_through,
     through_loops,
+    thumb_along,
 )
 from contact_core.grasping.filled import filled
 from contact_core.grasping.hand import Hand
@@ -109,7 +111,7 @@ def test_a_flat_hand_on_a_plate_does_not_oppose_and_one_round_a_ball_does() -> N
     closed = close_hands(one, request.field, *around(one, mesh))
     angles = []
     for n in range(len(closed.placed)):
-        pose = one.pose(closed.placed[n], closed.angles[n], closed.starts[n])
+        pose = one.pose(closed.placed[n], closed.angles[n], closed.turns[n])
         posed = skin(one.rig, forward_kinematics(one.rig.parents, pose.local))
         angles.append(opposition(one, posed, mesh, used))
     assert max(angles) > np.radians(120.0)
@@ -119,11 +121,11 @@ def test_a_flat_hand_on_a_plate_does_not_oppose_and_one_round_a_ball_does() -> N
 def around(one: Hand, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """A few hands that come to the middle of a mesh, its middle below the fingers."""
     placed = np.tile(np.eye(4), (6, 1, 1))
-    for n, along in enumerate(np.linspace(0.05, 0.3, 6)):
+    for n, ahead in enumerate(np.linspace(0.05, 0.3, 6)):
         placed[n, :3, 3] = (
             mesh.points.mean(axis=0) - one.description.palm.point - 0.5 * one.length * one.frame[:, 0]
         )
-        placed[n, :3, 3] -= along * one.length * one.frame[:, 1]
+        placed[n, :3, 3] -= ahead * one.length * one.frame[:, 1]
     return placed, np.tile(one.frame[:, 0], (6, 1))
 
 
@@ -140,7 +142,7 @@ def test_digits_at_rest_do_not_cross_and_those_that_spread_through_one_another_d
 def test_a_finger_in_a_ring_is_through_and_one_beside_it_is_not() -> None:
     one = hand()
     frames = one.frames(
-        np.eye(4)[None], np.zeros((1, len(one.joints))), np.zeros((1, len(one.bones) - 1), np.int64)
+        np.eye(4)[None], np.zeros((1, len(one.joints))), np.tile(np.eye(3), (1, len(one.bones) - 1, 1, 1))
     )
     tip = one.bones[2] - 1  # of the first finger
     middle = frames[0, tip, :3, :3] @ one.capsules[tip].mean(axis=0) + frames[0, tip, :3, 3]
@@ -174,3 +176,30 @@ def test_a_good_hold_has_no_failure_and_each_fault_is_named(kind: str) -> None:
         assert len(told) == 1 and word in told[0], (key, told)
     if kind == "power":
         assert "hold" in judge_hold({**GOOD, "closure": -0.2}, kind)[0]
+
+
+def test_along_is_the_way_of_a_rod_and_no_way_on_a_plate_or_a_ball() -> None:
+    angle = np.linspace(0.0, 1.5 * np.pi, 12)
+    rod = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    ball = np.concatenate([np.eye(3), -np.eye(3)])
+    plate = np.tile([0.0, 1.0, 0.0], (12, 1))
+    tips = np.array([[0.0, 0.0, 3.0], [0.2, 0.0, 0.0], [1.0, 0.0, 1.0]])
+
+    def told(normals: np.ndarray, press: float = 1.0) -> np.ndarray:
+        many = np.tile(normals, (len(tips), 1, 1))
+        return along(many, np.full(many.shape[:2], bool(press)), tips)
+
+    assert np.allclose(told(rod), [1.0, 0.0, 0.5])
+    assert np.allclose(told(ball), 0.0) and np.allclose(told(plate), 0.0) and np.allclose(told(rod, 0.0), 0.0)
+
+
+def test_a_thumb_at_rest_beside_a_rod_is_along_it_and_one_without_a_rod_is_not() -> None:
+    one = hand()
+    world = one.rig.rest_world
+    last = one.bones[1] - 1
+    tip = world[one.joints[last], :3, :3] @ np.diff(one.capsules[last], axis=0)[0]
+    far = skin(one.rig, world) + 100.0 * one.length
+    assert thumb_along(one, far, world, thing("ball")) == 0.0
+    normals = np.cross(tip, np.random.default_rng(0).normal(size=(1, 9, 3)))
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    assert along(normals, np.ones((1, 9), bool), tip[None])[0] > 0.95
