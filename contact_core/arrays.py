@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ Int32Array = npt.NDArray[np.int32]
 SingleArray = npt.NDArray[np.float32]
 ComplexArray = npt.NDArray[np.complex128]
 
+SMALL = 4096  # numbers of an array for which a call costs more than a pass
+
 
 def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name: str) -> npt.NDArray[Any]:
     """A contiguous read-only array of `dtype` and `shape` (None: any extent); a copy unless already frozen.
@@ -24,6 +27,8 @@ def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], nam
     Raises InvalidInput naming the array when the shape does not fit or a value is NaN or infinite.
     """
     wanted = np.dtype(dtype)
+    if type(values) is np.ndarray and _is_as_wanted(values, wanted, shape):
+        return values  # most of what a document holds when it is read
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as error:
@@ -51,6 +56,17 @@ def frozen(values: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], nam
     return array
 
 
+def all_finite(array: npt.NDArray[Any]) -> bool:
+    """Whether an array of numbers holds no NaN and no infinity."""
+    if array.dtype.kind not in "fc":
+        return True
+    if 0 < array.size < SMALL and math.isfinite(
+        np.vdot(array, array).real
+    ):  # one pass, no array; squares may overflow
+        return True
+    return bool(np.isfinite(array).all())
+
+
 def digest(*arrays: npt.NDArray[Any]) -> str:
     """A short content digest (32 hex digits) of the bytes and shapes of arrays, in order."""
     state = hashlib.sha256()
@@ -68,6 +84,16 @@ def _is_immutable(array: npt.NDArray[Any]) -> bool:
             return False
         holder = holder.base
     return holder is None  # anything else is memory that another library owns
+
+
+def _is_as_wanted(array: npt.NDArray[Any], wanted: np.dtype[Any], shape: tuple[int | None, ...]) -> bool:
+    """Whether nothing is to be done to make an array what `frozen` returns."""
+    if array.dtype != wanted or array.ndim != len(shape) or not array.flags.c_contiguous:
+        return False
+    for want, got in zip(shape, array.shape, strict=True):
+        if want is not None and want != got:
+            return False
+    return _is_immutable(array) and all_finite(array)
 
 
 def _spell(shape: tuple[int | None, ...]) -> str:

@@ -108,7 +108,7 @@ class PatchCoordinates:
         c = len(self.chain_angles)
         put(self, "chain_lengths", frozen(self.chain_lengths, np.float64, (c,), "chain_lengths"))
         starts = self.chain_starts
-        if starts[0] != 0 or starts[-1] != c or (np.diff(starts) < 0).any():
+        if starts[0] != 0 or starts[-1] != c or (starts[1:] < starts[:-1]).any():
             raise InvalidInput("chain_starts must rise from 0 to the number of chain_angles.")
         if n and self.anchors.min() < 0:
             raise InvalidInput("anchors are not negative.")

@@ -22,7 +22,8 @@ from contact_core.contact.shape import PatchShape
 from contact_core.document.codec import pretty, to_json
 from contact_core.document.document import ContactDocument
 from contact_core.document.frozen_map import FrozenMap
-from contact_core.document.schema import MAX_BYTES, SCHEMA, document_from_json, parse_json, shape_to_json
+from contact_core.document.schema import MAX_BYTES, SCHEMA, document_from_json, parse_json
+from contact_core.document.shape_texts import shape_to_json
 from contact_core.document.timeline import Key, Track
 from contact_core.errors import FileRefused
 

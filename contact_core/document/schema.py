@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
-from weakref import WeakKeyDictionary
 
-from contact_core.arrays import FloatArray
 from contact_core.contact.placement import Link
-from contact_core.contact.shape import PatchCoordinates, PatchShape
-from contact_core.document.codec import Fragment, from_json, pretty, to_json
+from contact_core.contact.shape import PatchShape
+from contact_core.document.codec import from_json, pretty, to_json, without_collector
 from contact_core.document.document import ContactDocument, Patch, is_name
 from contact_core.document.frozen_map import FrozenMap
+from contact_core.document.shape_texts import CUT, cut_out, keep_texts, shape_text
 from contact_core.document.time_checks import time_inconsistencies
 from contact_core.errors import EditedFile, FileRefused, quoted, shortened
 from contact_core.sealed import json_mistake
@@ -54,9 +54,20 @@ def dump_document(document: ContactDocument) -> bytes:
 
 def dump_with_digest(document: ContactDocument) -> tuple[bytes, str]:
     """What `dump_document` and `document_digest` return, at the cost of one."""
-    content = _content(document)
-    digest = _digest(content)
-    return b'{\n%b"%b",\n' % (_DIGEST_LINE, digest.encode()) + content.removeprefix(b"{\n"), digest
+    content, digest = content_with_digest(document)
+    return with_digest(content, digest), digest
+
+
+def content_with_digest(document: ContactDocument) -> tuple[bytes, str]:
+    """The canonical bytes of a document, which state no digest, and their digest."""
+    with without_collector():
+        content = _content(document)
+    return content, _digest(content)
+
+
+def with_digest(content: bytes, digest: str) -> bytes:
+    """A document file of canonical bytes: the same with the line that states their digest."""
+    return b'{\n%b"%b",\n' % (_DIGEST_LINE, digest.encode()) + content.removeprefix(b"{\n")
 
 
 def document_digest(document: ContactDocument) -> str:
@@ -81,13 +92,36 @@ def parse_document(text: bytes, source: str = "the document") -> ContactDocument
 
 def parse_with_digest(text: bytes, source: str = "the document") -> tuple[ContactDocument, str]:
     """What `parse_document` returns, and its `document_digest`. Raises FileRefused, EditedFile."""
-    data = parse_json(text, source)
-    stated = data.pop(DIGEST, "") if isinstance(data, dict) else ""
-    document = document_from_json(data, source)
-    if stated is not None and stated != written_digest(text) and stated != _digest(_canonical(data)):
-        raise EditedFile(_disbelief(source, bool(stated)))
-    known = isinstance(stated, str) and data["version"] == VERSION
-    return document, str(stated) if known else document_digest(document)
+    return parse_with_content(text, source)[:2]
+
+
+def parse_with_content(text: bytes, source: str) -> tuple[ContactDocument, str, bytes | None]:
+    """What `parse_with_digest` returns, and the document's canonical bytes where the file has them; None where it
+    lies otherwise. Raises FileRefused, EditedFile."""
+    with without_collector():
+        data, texts = _parse(text, source)
+        stated = data.pop(DIGEST, "") if isinstance(data, dict) else ""
+        document = document_from_json(data, source)
+        content = written_content(text)
+        found = _digest(content)
+        if stated is not None and stated != found and stated != _digest(_canonical(data)):
+            raise EditedFile(_disbelief(source, bool(stated)))
+        known = isinstance(stated, str) and data["version"] == VERSION
+        digest = str(stated) if known else document_digest(document)
+        if digest != found:
+            return document, digest, None
+        keep_texts(document.shapes, texts)
+        return document, digest, content
+
+
+def _parse(text: bytes, source: str) -> tuple[Any, dict[str, str]]:
+    """The JSON of a document, and the text of each of its shapes; none where it is not laid out for it."""
+    with contextlib.suppress(ValueError, RecursionError):  # said below
+        found = cut_out(text.decode()) if len(text) <= MAX_BYTES else None
+        data = _DECODER.decode(found[0]) if found is not None else None
+        if found is not None and isinstance(data, dict) and data.get("shapes") == CUT:
+            return {**data, "shapes": {key: _DECODER.decode(item) for key, item in found[1].items()}}, found[1]
+    return parse_json(text, source), {}
 
 
 def written_digest(text: bytes) -> str:
@@ -99,12 +133,6 @@ def written_content(text: bytes) -> bytes:
     """A document file that lies as `dump_document` wrote it without the line that states the digest."""
     lines = text.split(b"\n", 2)
     return lines[0] + b"\n" + lines[2] if len(lines) == 3 and lines[1].startswith(_DIGEST_LINE) else text
-
-
-def content_of(text: bytes, digest: str) -> bytes | None:
-    """The canonical bytes of the document of this digest that a file holds; None where it lies otherwise."""
-    content = written_content(text)
-    return content if _digest(content) == digest else None
 
 
 def parse_edited(text: bytes, source: str = "the document") -> ContactDocument:
@@ -238,17 +266,9 @@ def _cycles(document: ContactDocument) -> Iterator[str]:
         sound.update(line)
 
 
-def shape_to_json(shape: PatchShape) -> dict[str, Any]:
-    """JSON-able data of a shape as it stands in a document, the bulk of it as text that is made once for files and
-    hosts."""
-    coordinates, weights = _points_texts(shape)
-    own = {"axis": to_json(shape.axis), "meters_per_unit": float(shape.meters_per_unit)}
-    return {**own, "coordinates": coordinates, "weights": weights}
-
-
 def _content(document: ContactDocument) -> bytes:
     """The canonical bytes of a document, without a digest."""
-    shapes = {key: _shape_text(shape) for key, shape in document.shapes.items()}
+    shapes = {key: shape_text(shape) for key, shape in document.shapes.items()}
     return _canonical(document_to_json(replace(document, shapes=FrozenMap())) | {"shapes": shapes})
 
 
@@ -269,29 +289,6 @@ def _disbelief(source: str, has_digest: bool) -> str:
     )
 
 
-_shape_texts: WeakKeyDictionary[PatchShape, Fragment] = WeakKeyDictionary()
-_kept_texts: WeakKeyDictionary[PatchCoordinates, tuple[FloatArray, Fragment, Fragment]] = WeakKeyDictionary()
-
-
-def _shape_text(shape: PatchShape) -> Fragment:
-    """The text of a shape as it stands in a file, two levels deep, kept from one save to the next."""
-    if shape not in _shape_texts:
-        _shape_texts[shape] = Fragment(pretty(shape_to_json(shape), 2))
-    return _shape_texts[shape]
-
-
-def _points_texts(shape: PatchShape) -> tuple[Fragment, Fragment]:
-    """The texts of the coordinates and weights of a shape as they stand in a document, three levels deep.
-
-    They are kept with the coordinates, which a new axis shares: bending a patch encodes its axis alone.
-    """
-    kept = _kept_texts.get(shape.coordinates)
-    if kept is None or kept[0] is not shape.weights:
-        coordinates, weights = (Fragment(pretty(to_json(x), 3)) for x in (shape.coordinates, shape.weights))
-        kept = _kept_texts[shape.coordinates] = (shape.weights, coordinates, weights)
-    return kept[1:]
-
-
 def _object_of(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A JSON object; one that names a key twice says two things at once."""
     found = dict(pairs)
@@ -303,3 +300,6 @@ def _object_of(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _refuse_constant(name: str) -> Any:
     raise ValueError(f"{name} is not a number that a document may hold")
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse_constant, object_pairs_hook=_object_of)

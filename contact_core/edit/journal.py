@@ -8,14 +8,13 @@ thread flushes it to the disk within FLUSH_SECONDS, which is the window that a p
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import threading
 from pathlib import Path
 from typing import Any
 
 from contact_core.atomic_file import write_atomic
-from contact_core.document.schema import document_digest, document_to_json
+from contact_core.document.schema import content_with_digest
 from contact_core.edit.command import command_to_json
 from contact_core.edit.history import History, Step
 from contact_core.edit.journal_file import ID_DIGITS, SCHEMA, VERSION, encode_head, encode_line
@@ -57,11 +56,13 @@ class Journal:
         events = [_event_of(step) for step in history.steps]
         if history.can_redo:
             events.append({"goto": history.revision})
-        known = content is not None and file_digest is not None
-        journal_id = (file_digest if known and file_digest else document_digest(history.base))[:ID_DIGITS]
-        text = content if known and content else json.dumps(document_to_json(history.base)).encode()
+        if content is None or file_digest is None:
+            content, digest = content_with_digest(history.base)
+        else:
+            digest = file_digest
+        journal_id = digest[:ID_DIGITS]
         lines = (encode_line(event, number, journal_id) for number, event in enumerate(events, start=2))
-        write_atomic(path, encode_head(header, text, journal_id) + b"".join(lines))
+        write_atomic(path, encode_head(header, content, journal_id) + b"".join(lines))
         return cls(path, 1 + len(events), journal_id)
 
     def did(self, step: Step) -> None:

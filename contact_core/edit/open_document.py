@@ -9,7 +9,15 @@ from contact_core.document.lock import DocumentLock
 from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
 from contact_core.edit.history import History, Step
 from contact_core.edit.journal import Journal
-from contact_core.edit.recovery import digest_of, journal_path, keep_foreign, open_file, set_aside, write_document
+from contact_core.edit.recovery import (
+    digest_of,
+    journal_path,
+    keep_foreign,
+    open_file,
+    set_aside,
+    write_document,
+    write_with_content,
+)
 from contact_core.errors import FileRefused
 
 
@@ -57,8 +65,9 @@ class OpenDocument:
         try:
             kept = set_aside(path)
             notes = () if kept is None else (f"a journal of {path.name} with edits is kept as {kept}.",)
-            digest = write_document(path, history.document)
-            journal = Journal.start(journal_path(path), history, digest)
+            content, digest = write_with_content(path, history.document)
+            known = content if history.document is history.base else None
+            journal = Journal.start(journal_path(path), history, digest, known)
             journal.saved(history.revision, digest)
             return cls(path, journal, lock, notes, digest=digest)
         except BaseException:

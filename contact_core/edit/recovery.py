@@ -11,12 +11,13 @@ from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import (
     MAX_BYTES,
-    content_of,
+    content_with_digest,
     document_digest,
-    dump_with_digest,
     parse_edited,
+    parse_with_content,
     parse_with_digest,
     same_documents,
+    with_digest,
     written_digest,
 )
 from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
@@ -79,9 +80,14 @@ def read_document(path: Path) -> tuple[ContactDocument, str]:
 
 def write_document(path: Path, document: ContactDocument) -> str:
     """Write a document atomically; returns its digest. Raises FileRefused."""
-    raw, digest = dump_with_digest(document)
-    write_atomic(path, raw)
-    return digest
+    return write_with_content(path, document)[1]
+
+
+def write_with_content(path: Path, document: ContactDocument) -> tuple[bytes, str]:
+    """Write a document atomically; returns its canonical bytes and its digest. Raises FileRefused."""
+    content, digest = content_with_digest(document)
+    write_atomic(path, with_digest(content, digest))
+    return content, digest
 
 
 def accept_file(path: Path) -> str:
@@ -174,8 +180,7 @@ def _open_locked(path: Path, lock: DocumentLock, commands: CommandTable) -> Open
     try:
         if path.exists():
             raw = read_bounded(path, MAX_BYTES)
-            document, digest = parse_with_digest(raw, str(path))
-            found = _Found(path, lock, notes, document, digest, content_of(raw, digest))
+            found = _Found(path, lock, notes, *parse_with_content(raw, str(path)))
     except FileRefused as error:
         if old is None or isinstance(error, EditedFile) or "newer contact-core" in str(error):
             raise  # what can be read is somebody's edit, perhaps

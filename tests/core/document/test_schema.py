@@ -8,6 +8,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from contact_core.arrays import all_finite
 from contact_core.contact.placement import Root
-from contact_core.document import schema
+from contact_core.document import schema, shape_texts
 from contact_core.document.codec import from_json, pretty, to_json
 from contact_core.document.document import ContactDocument, Patch, Surface
 from contact_core.document.frozen_map import FrozenMap
@@ -72,6 +74,48 @@ def test_what_is_kept_of_the_text_changes_no_byte(seed: int) -> None:
     data = {"digest": document_digest(document), **schema.document_to_json(document)}
     assert dump_document(document).decode() == pretty(data) + "\n"
     assert dump_document(copy.deepcopy(document)) == dump_document(document)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_what_was_read_is_written_again_without_encoding_what_nobody_changed(seed: int) -> None:
+    """The texts of its shapes are those of the file; a changed one is encoded, and no byte differs."""
+    written = dump_document(random_document(seed))
+    document = parse_document(written)
+    with pytest.MonkeyPatch.context() as patched:
+        encoded: list[Any] = []
+        real = shape_texts.shape_to_json
+        patched.setattr(shape_texts, "shape_to_json", lambda shape: (encoded.append(shape), real(shape))[1])
+        assert dump_document(document) == written and not encoded
+        for key, shape in list(document.shapes.items())[:1]:
+            changed = document.with_shape(key, replace(shape, meters_per_unit=2.0 * shape.meters_per_unit))
+            raw = dump_document(changed)
+            assert encoded == [changed.shapes[key]]
+            assert raw == dump_document(copy.deepcopy(changed))  # of which no text is kept
+
+
+@pytest.mark.parametrize("name", ["s", 'a": {', '\\": ', '"shapes": {', "},", "ü", shape_texts.CUT])
+def test_shapes_are_cut_out_whatever_they_are_called(name: str) -> None:
+    """Names that look like the layout, in the place of a key and in the notes of a host."""
+    document = random_document(3)
+    shapes = {f"{name}{k}": shape for k, shape in enumerate(document.shapes.values())}
+    keys = dict(zip(document.shapes, shapes, strict=True))
+    patches = {key: replace(patch, shape=keys[patch.shape]) for key, patch in document.patches.items()}
+    extras = FrozenMap({"host": FrozenMap({"shapes": FrozenMap({name: 1})})})
+    named = replace(document, shapes=FrozenMap(shapes), patches=FrozenMap(patches), extras=extras)
+    raw = dump_document(named)
+    assert same_documents(parse_document(raw), named)
+    assert dump_document(parse_document(raw)) == raw
+    assert same_documents(parse_document(json.dumps(json.loads(raw)).encode()), named)
+
+
+def test_a_shape_that_is_there_twice_is_refused() -> None:
+    """Cut out or not: a file that says two things at once is none."""
+    raw = dump_document(random_document(3)).decode()
+    start = raw.index('\n "shapes": {\n') + len('\n "shapes": {\n')
+    piece = raw[start : raw.index("\n  }", start)] + "\n  },\n"
+    with pytest.raises(FileRefused, match="twice"):
+        parse_document((raw[:start] + piece + raw[start:]).encode())
 
 
 def test_it_is_made_for_review() -> None:
@@ -162,6 +206,9 @@ def test_what_does_not_fit_is_refused_in_words(change: dict[str, Any], says: str
         ("anchors", ["a"], "finite numbers"),
         ("anchors", "abc", "wants a list"),
         ("legs", [[1.0]], "pairs of numbers"),
+        ("legs", [[1.0, 2.0], 3.0], "pairs of numbers"),
+        ("legs", [["1.0", "2.0"]], "finite numbers"),
+        ("legs", [[1.0, 10**400]], "finite numbers"),
         ("chain_starts", [0, 5], "does not fit"),
     ],
 )
@@ -171,6 +218,17 @@ def test_arrays_are_checked(field: str, value: Any, says: str) -> None:
     shape["coordinates"][field] = value
     with pytest.raises(FileRefused, match=says):
         parse_document(json.dumps(data).encode())
+
+
+@pytest.mark.parametrize("size", [1, 7, 5000])
+def test_finite_arrays_are_told_from_others(size: int) -> None:
+    """Also where squares overflow, and where not every number lies beside the next."""
+    for dtype in (np.float64, np.complex128):
+        array = np.full(size, 1e200, dtype)
+        assert all_finite(array) and all_finite(array[::2]) and all_finite(array[:0])
+        for wrong in (np.nan, np.inf, -np.inf):
+            array[-1] = wrong
+            assert not all_finite(array) and not all_finite(array[::-1])
 
 
 @settings(max_examples=25, deadline=None)

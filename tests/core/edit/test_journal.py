@@ -330,8 +330,7 @@ def test_opening_what_was_closed_in_order_costs_its_document_once(
         real = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *arguments: (told.append(name), real(*arguments))[1])
 
-    count(journals, "document_to_json")
-    count(journals, "document_digest")
+    count(journals, "content_with_digest")
     count(journal_file, "document_from_json")
     session = Session.open(path)
     assert told == [] and same_documents(session.timed_document, document)
