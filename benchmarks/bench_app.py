@@ -11,10 +11,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
-import shutil
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -23,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from harness import record
+from in_browser import CHROMIUM, seen, view_of, watched
 
 from contact_core.interaction.events import Key, Pointer
 from contact_viewer.application import Application
@@ -32,13 +29,7 @@ from contact_viewer.web.stream import encoded
 
 SIZE = (1280, 720)
 ASSETS = Path(os.environ.get("CONTACT_ASSETS", "../shared/assets"))
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-WATCH = """() => {
-  const image = document.querySelector('img.image-display-area');
-  window.seen = []; window.moved = [];
-  image.addEventListener('load', () => window.seen.push(performance.now()));
-  window.addEventListener('mousemove', () => window.moved.push(performance.now()), true);
-}"""
+PANELS = (384, 82)  # width and height of what stands round the view in the browser
 
 
 def files() -> list[str]:
@@ -114,57 +105,57 @@ def drags(app: Application, start: Any, moves: int) -> dict[str, list[float]]:
     return times
 
 
-def in_browser(moves: int) -> dict[str, list[float]]:
-    """From a move of the mouse in a real browser to the image that shows it."""
-    from playwright.sync_api import sync_playwright
+def in_browser(moves: int) -> dict[str, Any]:
+    """From a move of the mouse in a real browser to the image that shows it: single moves, each seen before the
+    next, and a mouse that does not stop."""
+    rows = {}
+    with tempfile.TemporaryDirectory() as folder:
+        app, _, _ = artist(Path(folder) / "state")
+        app.resize(SIZE[0] - PANELS[0], SIZE[1] - PANELS[1])
+        app.canvas.eye.look_from("front")
+        app.see_all()
+        app.frame()
+        copy = app.interaction.selection.patches[-1]
+        seen_on = app.interaction.desk.scene.surfaces[app.session.document.patches[copy].surface]
+        where = seen_on.positions(app.session.geometry.points(copy)).mean(axis=0)
+        on_patch = app.canvas.eye.project(where[None])[0, :2]
+        scene = Path(folder) / "scene.contactscene"
+        app.write(scene)
+        app.close()
+        with watched([str(scene)], SIZE) as page:
+            for key in ("1", "Home"):
+                page.keyboard.press(key)
+            left, top, width, height = view_of(page)
+            beside = np.round([left + 0.3 * width, top + 0.6 * height])
+            for what, key, button, start in (
+                ("hover", "b", "", beside),
+                ("paint", "b", "left", beside),
+                ("drag and the hand follows", "g", "left", np.round(on_patch + np.array([left, top]))),
+                ("orbit", "b", "middle", beside),
+            ):
+                for how, count, apart in (
+                    ("single moves", moves, 250),
+                    ("a mouse that does not stop", 3 * moves, 0),
+                ):
+                    page.keyboard.press(key)
+                    page.mouse.move(*start)
+                    page.wait_for_timeout(1000)
+                    if button:
+                        page.mouse.down(button=button)
+                    rows[f"in the browser, {what}, {how}: move to image, ms"] = str(
+                        seen(page, [tuple(start + place) for place in wound(count)], apart)
+                    )
+                    if button:
+                        page.mouse.up(button=button)
+                    page.keyboard.press("Control+z" if button == "left" else "Escape")
+                    page.wait_for_timeout(1000)
+    return rows
 
-    folder = Path(tempfile.mkdtemp())
-    command = [sys.executable, "-m", "contact_core.cli", "view", "--no-browser", *files()]
-    server = subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "CONTACT_STATE": str(folder)}
-    )
-    assert server.stdout is not None
-    found = re.search(r"http\S+", server.stdout.readline())
-    assert found is not None
-    try:
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
-            page.goto(found[0])
-            page.wait_for_selector("img.image-display-area", timeout=60_000)
-            page.keyboard.press("1")
-            page.keyboard.press("b")
-            page.wait_for_timeout(1500)
-            page.evaluate(WATCH)
-            box = page.locator("img.image-display-area").bounding_box()
-            assert box is not None
-            middle = (box["x"] + 0.3 * box["width"], box["y"] + 0.6 * box["height"])
-            times = {"hover": seen_after(page, middle, moves)}
-            for what, button in (("paint", "left"), ("orbit", "middle")):
-                page.mouse.move(*middle)
-                page.mouse.down(button=button)
-                times[what] = seen_after(page, middle, moves)
-                page.mouse.up(button=button)
-                page.wait_for_timeout(1500)
-            browser.close()
-    finally:
-        server.terminate()
-        server.wait(20)
-        shutil.rmtree(folder, ignore_errors=True)
-    return times
 
-
-def seen_after(page: Any, start: tuple[float, float], moves: int) -> list[float]:
-    """Milliseconds of single moves, each of which has to be seen before the next."""
-    times = []
-    for k in range(moves):
-        page.evaluate("() => { window.seen.length = 0; window.moved.length = 0; }")
-        page.mouse.move(start[0] + 2 * k, start[1] + k % 5)
-        page.wait_for_timeout(150)
-        took = page.evaluate("() => (window.seen.find((t) => t > window.moved[0]) || NaN) - window.moved[0]")
-        if took is not None and np.isfinite(took):
-            times.append(float(took))
-    return times
+def wound(count: int) -> Any:
+    """(count, 2) whole pixels round a circle that wanders to the right, no two alike in a row."""
+    k = np.arange(1, count + 1)
+    return np.round(14.0 * np.stack([np.sin(0.3 * k) + 0.09 * k, 1.0 - np.cos(0.3 * k)], axis=1))
 
 
 def main() -> None:
@@ -186,8 +177,7 @@ def main() -> None:
     if hasattr(os, "getloadavg"):
         rows["load of the machine meanwhile"] = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     if CHROMIUM is not None:
-        for what, each in in_browser(min(moves, 30)).items():
-            rows[f"in the browser, {what}: move to image, ms"] = f"{spelt(each)}, {len(each)} moves seen"
+        rows |= in_browser(min(moves, 30))
     record("app", rows)
 
 

@@ -38,7 +38,9 @@ _SIDES = {"view.front": "front", "view.side": "right", "view.top": "top"}
 class Application(TreeActions, FileActions):
     """What an artist has before them.
 
-    sources: as for `files.open_files`. notes: sentences on what opening found, and what the last action did.
+    sources: as for `files.open_files`. beside: the hand that follows a drag is solved on a thread, so that what is
+    dragged is drawn at once, and the hand a frame later. notes: sentences on what opening found, and what the last
+    action did.
     """
 
     def __init__(
@@ -48,7 +50,9 @@ class Application(TreeActions, FileActions):
         plugins: PluginManager | None = None,
         *,
         state_folder: Path | None = None,
+        beside: bool = False,
     ) -> None:
+        self._beside = beside
         self.canvas, self.panes = canvas, Panes(canvas)
         self.plugins = plugins or PluginManager()
         self.notes: list[str] = []
@@ -119,7 +123,7 @@ class Application(TreeActions, FileActions):
         if isinstance(session.host, ViewerHost):
             session.host.canvas = self.canvas
         self._session = session
-        self._interaction = Interaction(session, meters_per_unit=meters)
+        self._interaction = Interaction(session, meters_per_unit=meters, beside=self._beside)
         self._interaction.film.follows = True
         self._recovery.follow(session)
         self.panes.join()
@@ -336,10 +340,11 @@ class Application(TreeActions, FileActions):
 
     # -- frames --------------------------------------------------------------------------------------------------
 
-    def frame(self) -> frozenset[str]:
+    def frame(self, *, advance: bool = True) -> frozenset[str]:
         """Do what is due, once before each frame: returns what changed, "camera" among it; empty for nothing, so
-        that nothing has to be drawn."""
-        self.interaction.advance()
+        that nothing has to be drawn. advance: whether poses follow and long work is taken over first."""
+        if advance:
+            self.interaction.advance()
         if self.guide.follow():
             self._redraw()
         if self.film_open and not self.interaction.is_busy and not self.interaction.film.playback.is_playing:

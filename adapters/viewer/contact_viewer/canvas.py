@@ -42,7 +42,7 @@ from contact_viewer.standing import Standing
 
 GHOST = 0.32  # opacity of a surface that one looks through
 _LIGHTS = (((-0.45, 0.7, 0.9), 0.82), ((0.6, -0.2, 0.8), 0.40))
-_FRAME = 0.035  # seconds that a frame may take while things move
+_FRAME = 0.026  # seconds that a frame may take while things move
 _DETAILS = (1.0, 0.85, 0.7, 0.55)  # of width and height, that are drawn then
 _SAMPLES = 8  # for a pixel of a frame that stands still
 _HIDDEN = 0.35  # opacity of a line where something lies before it

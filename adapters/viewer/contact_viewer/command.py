@@ -42,7 +42,7 @@ class ViewCommand:
         from contact_viewer.gl import off_screen_window
         from contact_viewer.web.server import WebApplication
 
-        app = Application(Canvas(off_screen_window((1280, 720))), arguments.files, arguments.plugins)
+        app = Application(Canvas(off_screen_window((1280, 720))), arguments.files, arguments.plugins, beside=True)
         output = arguments.output
 
         with ExitStack() as stack:

@@ -18,7 +18,7 @@ from urllib.parse import parse_qs, urlsplit
 
 STARTS_WITHIN = 60  # seconds
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-IMAGE = "img.image-display-area"
+IMAGE = "canvas.contact-image[data-drawn]"
 
 
 @dataclass(frozen=True)
@@ -124,10 +124,11 @@ class Page:
         return box["x"], box["y"]
 
     def image(self) -> bytes:
-        """The file of the image that is shown."""
+        """The image that is shown, as a PNG."""
         script = f"""async () => {{
-            const data = await (await fetch(document.querySelector('{IMAGE}').src)).arrayBuffer();
-            return Array.from(new Uint8Array(data));
+            const canvas = document.querySelector('{IMAGE}');
+            const blob = await new Promise((done) => canvas.toBlob(done, 'image/png'));
+            return Array.from(new Uint8Array(await blob.arrayBuffer()));
         }}"""
         return bytes(self.page.evaluate(script))
 
@@ -149,11 +150,8 @@ class Page:
         mouse.up()
 
     def _arrive(self) -> None:
-        """Wait until the server has every event so far. The browser makes one of two moves in a frame, and the page
-        one of all moves that wait while the server owes it an answer, which it sends a few milliseconds after: so
-        the answer first, then a pause of more than that and two frames, then the answer to what was sent in it."""
-        self._answer()
-        self.page.wait_for_timeout(30)
+        """Wait until the server has every event so far: the browser makes one of two moves in a frame of its own,
+        and an answer says that what was sent before it is there."""
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         self._answer()
 

@@ -263,7 +263,7 @@ def test_a_dense_screen_is_drawn_and_picked_densely(browser: Any, served: Served
     """At two device pixels per pixel the image has twice as many, and a click meets what is under it."""
     page = Page.opened(browser, served.address, scale=2.0)
     page.until(
-        f"() => document.querySelector('{IMAGE}').naturalWidth > 1.8 * document.querySelector('{IMAGE}').width"
+        f"() => document.querySelector('{IMAGE}').width > 1.8 * document.querySelector('{IMAGE}').clientWidth"
     )
     page.key("b")
     page.drag((0.5, 0.5), (0.52, 0.49))

@@ -13,10 +13,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from contact_viewer.web.browser_events import key_of, pointer_of
 from contact_viewer.web.guard import Guard
+from contact_viewer.web.stream import changed
 from tests.adapters.viewer.served import Served, serving
 
 for _module in ("vtkmodules", "trame", "trame_rca", "trame_vuetify", "aiohttp"):
@@ -187,3 +189,23 @@ def test_keys_come_as_they_are_engraved() -> None:
         key = key_of(event, 0.0)
         assert key is not None and key.chord == chord
     assert key_of({"key": "Dead"}, 0.0) is None and key_of({}, 0.0) is None
+
+
+# -- what is sent --------------------------------------------------------------------------------------------------
+
+
+def test_the_rectangle_that_changed_holds_every_change() -> None:
+    """Drawn over the image before, it is the image now; its blocks are whole, so that no neighbour is encoded."""
+    before = np.random.default_rng(7).integers(0, 255, (100, 150, 4), np.uint8)
+    for corner, far in (((0, 0), (1, 1)), ((37, 52), (61, 99)), ((99, 149), (100, 150)), ((0, 0), (100, 150))):
+        now = before.copy()
+        now[corner[0] : far[0], corner[1] : far[1], :3] ^= 1
+        left, top, right, bottom = changed(before, now)
+        assert left % 16 == top % 16 == 0
+        assert right % 16 == 0 or right == 150
+        shown = before.copy()
+        shown[top:bottom, left:right] = now[top:bottom, left:right]
+        assert np.array_equal(shown, now)
+        assert right - left < far[1] - corner[1] + 32 and bottom - top < far[0] - corner[0] + 32
+    assert changed(before, before.copy()) == (0, 0, 0, 0)
+    assert changed(None, before) == changed(before[:50], before) == (0, 0, 150, 100)

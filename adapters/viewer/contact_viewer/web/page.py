@@ -55,10 +55,10 @@ def build(server: Any, stream_name: str) -> None:
             with html.Div(
                 classes="contact-view", style=("`inset: 44px 320px ${film_open ? 300 : 38}px 64px;`",)
             ):  # fmt: skip
-                rca.RemoteControlledArea(
-                    name=stream_name, display="image", send_mouse_move=True, event_throttle_ms=8,
-                    style="width: 100%; height: 100%;",
-                )  # fmt: skip
+                with rca.RemoteControlledArea(
+                    name=stream_name, display="image", event_throttle_ms=0, style="width: 100%; height: 100%;",
+                ):  # fmt: skip
+                    html.Canvas(classes="contact-image")
                 html.Div(v_if=("split",), classes="contact-divider")
                 library(v3, html)
                 with html.Div(v_if=("heat",), classes="contact-legend"):
