@@ -8,14 +8,15 @@ Euler and axis-angle channels take another way between the same keys: they get k
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from contact_blender import compat, keys
+from contact_blender import compat, keying_set, keys, nla
 from contact_blender.channels import is_there, near_angles, rotation_channel
+from contact_blender.keying_set import ChannelKey
 from contact_blender.rig import UNMOVED, read_skeleton
 from contact_core.arrays import BoolArray, FloatArray
 from contact_core.errors import InvalidInput
@@ -32,13 +33,15 @@ LINEAR, BEZIER = 1, 2  # kinds of interpolation
 
 @dataclass(frozen=True, eq=False)
 class BoneCurves:
-    """What a bone's channel gets: frames (k,), values and slopes per frame (k, w)."""
+    """What a bone's channel gets: frames (k,), values and slopes per frame (k, w). places: of w, those that are
+    keyed."""
 
     channel: str
     frames: FloatArray
     values: FloatArray
     slopes: FloatArray
     interpolation: int = BEZIER
+    places: tuple[int, ...] = (0, 1, 2, 3)
 
 
 def write(armature: Any, rig: Rig, pose_keys: PoseKeys, stretch: FloatArray, posed: Collection[str]) -> None:
@@ -46,9 +49,14 @@ def write(armature: Any, rig: Rig, pose_keys: PoseKeys, stretch: FloatArray, pos
 
     rig: what the keys are of, whose space is the armature's after a stretch (3, 3). posed: the bones that a solve
     may pose; another is keyed only where it is to be elsewhere than it is. Keys outside, other bones and other
-    channels stay as they are. Raises InvalidInput for unknown bones, scale that no channel holds, and shifts
-    of connected bones, before anything is written.
+    channels stay as they are. With an active keying set the curves are those of what the set names of these bones;
+    what it names beside them, and has no curve yet, is keyed as it is at each of the keys.
+
+    Raises InvalidInput for unknown bones, scale that no channel holds, shifts of connected bones, a keying set that
+    has nothing of the bones and times that a tweaked strip has not, before anything is written; and where strips of
+    the NLA show something else.
     """
+    keys.check_action(armature)
     motion = _Motion(rig, pose_keys, stretch)
     skeleton = read_skeleton(armature)
     bases = {name: np.linalg.inv(local) for name, local in zip(skeleton.joints, skeleton.edit_local, strict=True)}
@@ -59,11 +67,52 @@ def write(armature: Any, rig: Rig, pose_keys: PoseKeys, stretch: FloatArray, pos
     bones = armature.pose.bones
     moved = [n for n in named if n in posed or _moves(bones[n], bases[n] @ motion.local(n, motion.frames))]
     found = {name: _curves_of(bones[name], bases[name], motion) for name in moved}
+    chosen, held = keying_set.active(by_auto_key=False), list[ChannelKey]()
+    if chosen is not None:
+        found, held = _chosen(armature, found, keys.named(armature, dict.fromkeys(found, ()), chosen))
+    rate = nla.rate(armature, motion.frames)
     for name, curves in found.items():
         for curve in curves:
-            _put(armature, name, curve)
+            _put(armature, name, curve, rate)
+    for frame in pose_keys.frames:
+        keys.insert_at(armature, held, float(frame))
+    nla.check_seen(armature, {float(end): _at(armature, found, end) for end in motion.frames[[0, -1]]})
     keys.show_animation(armature, {name: tuple(c.channel for c in curves) for name, curves in found.items()})
     armature.update_tag(refresh={"OBJECT"})
+
+
+Found = dict[str, list[BoneCurves]]  # by bone
+
+
+def _chosen(armature: Any, found: Found, named: list[ChannelKey]) -> tuple[Found, list[ChannelKey]]:
+    """Of curves those that a keying set names, and what else it names that has no curve yet."""
+    places: dict[str, set[int]] = {}
+    for each in named:
+        places.setdefault(each.path, set()).update(range(4) if each.index < 0 else (each.index,))
+    bones, kept, known = armature.pose.bones, Found(), {curve.data_path for curve in compat.fcurves(armature)}
+    for name, curves in found.items():
+        paths = [bones[name].path_from_id(curve.channel) for curve in curves]
+        known.update(paths)
+        kept[name] = [
+            replace(curve, places=tuple(sorted(places[path])))
+            for path, curve in zip(paths, curves, strict=True)
+            if path in places
+        ]
+    return kept, [each for each in named if each.path not in known]
+
+
+def _at(armature: Any, found: Found, frame: float) -> dict[tuple[str, int], float]:
+    """What curves with a key at a frame say there, but for numbers that drivers set."""
+    driven = {(each.data_path, each.array_index) for each in compat.drivers(armature)}
+    rows = {
+        (armature.pose.bones[name].path_from_id(curve.channel), place): float(values[place])
+        for name, curves in found.items()
+        for curve in curves
+        for values in curve.values[curve.frames == frame]
+        for place in curve.places
+        if place < len(values)
+    }
+    return {number: value for number, value in rows.items() if number not in driven}
 
 
 def _moves(pose_bone: Any, seen: FloatArray) -> bool:
@@ -175,19 +224,25 @@ def _off(mode: str, curve: BoneCurves, frames: FloatArray, wanted: FloatArray) -
     return np.asarray((turns * Rotation.from_matrix(wanted).inv()).magnitude())
 
 
-def _put(armature: Any, bone: str, curve: BoneCurves) -> None:
-    """Put the keys of a channel into its curves, which are made where there are none and no driver is."""
+def _put(armature: Any, bone: str, curve: BoneCurves, rate: float) -> None:
+    """Put the keys of a channel into its curves, which are made where there are none and no driver is.
+
+    rate: frames of the action for one of the scene.
+    """
     pose_bone = armature.pose.bones[bone]
     path = pose_bone.path_from_id(curve.channel)
     known = {c.array_index for c in compat.fcurves(armature) if c.data_path == path}
     known |= {driver.array_index for driver in compat.drivers(armature) if driver.data_path == path}
-    new = set(range(curve.values.shape[1])) - known
-    if new:
-        getattr(pose_bone, curve.channel)[:] = curve.values[0].tolist()
+    new = set(range(curve.values.shape[1])) & set(curve.places) - known
+    for index in new:
+        getattr(pose_bone, curve.channel)[index] = float(curve.values[0, index])
     for index in new:
         pose_bone.keyframe_insert(curve.channel, index=index, frame=float(curve.frames[0]), group=bone)
-    for found in [c for c in compat.fcurves(armature) if c.data_path == path]:
+    curve = replace(curve, frames=nla.action_frames(armature, curve.frames), slopes=curve.slopes / rate)
+    for found in [each for each in compat.fcurves(armature) if each.data_path == path]:
         index = int(found.array_index)
+        if index not in curve.places:
+            continue
         values, slopes = curve.values[:, index], curve.slopes[:, index]
         keys.put_keys(found, _joined(keys.keys_of(found), curve, values, slopes))
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import bpy
 import numpy as np
 
-from contact_blender import compat, keying_set
+from contact_blender import compat, keying_set, nla
 from contact_blender.keying_set import ChannelKey
 from contact_core.errors import InvalidInput
 
@@ -35,23 +35,39 @@ def insert(armature: Any, written: Written, frame: float, *, by_auto_key: bool) 
     """Key the channels that were written, or of those bones what the user's active keying set names.
 
     Auto-key's own preferences ("only available", "only active keying set") hold where auto-key is what keys. What a
-    driver sets is left out. Raises InvalidInput where the keying set has nothing of these bones, and where the
-    action is another file's.
+    driver sets is left out. Raises InvalidInput where the keying set has nothing of these bones, where the action
+    is another file's, and where strips of the NLA would show something else.
     """
-    _check_action(armature)
+    check_action(armature)
     chosen = keying_set.active(by_auto_key=by_auto_key)
-    found = _written(armature, written) if chosen is None else _named(armature, written, chosen)
+    found = _written(armature, written) if chosen is None else named(armature, written, chosen)
     if chosen is None and by_auto_key and bpy.context.preferences.edit.use_keyframe_insert_available:
         there = {curve.data_path for curve in compat.fcurves(armature)}
         found = [each for each in found if each.path in there]
-    driven = {(each.data_path, each.array_index) for each in compat.drivers(armature)}
+    values = {
+        (each.path, place): float(armature.path_resolve(each.path)[place])
+        for each in found
+        for place in _places(armature, each)
+        if _count(armature, each.path) > 1
+    }
+    insert_at(armature, found, frame)
+    nla.check_seen(armature, {frame: values})
+
+
+def insert_at(armature: Any, found: Sequence[ChannelKey], frame: float) -> None:
+    """Key what channels hold now, but for what drivers set."""
     for each in found:
-        count = _count(armature, each.path)
-        free = [place for place in range(count) if (each.path, place) not in driven]
-        places = [-1] if each.index < 0 and len(free) == count else free if each.index < 0 else [each.index]
-        for place in places:
-            if (each.path, max(place, 0)) not in driven:
-                armature.keyframe_insert(each.path, index=place, frame=frame, group=each.group)
+        places = _places(armature, each)
+        whole = each.index < 0 and len(places) == _count(armature, each.path)
+        for place in (-1,) if whole else places:
+            armature.keyframe_insert(each.path, index=place, frame=frame, group=each.group)
+
+
+def _places(armature: Any, channel: ChannelKey) -> list[int]:
+    """Which numbers of its path a channel key sets: those that no driver does."""
+    driven = {each.array_index for each in compat.drivers(armature) if each.data_path == channel.path}
+    chosen = range(_count(armature, channel.path)) if channel.index < 0 else (channel.index,)
+    return [place for place in chosen if place not in driven]
 
 
 def _written(armature: Any, written: Written) -> list[ChannelKey]:
@@ -60,7 +76,7 @@ def _written(armature: Any, written: Written) -> list[ChannelKey]:
     return [ChannelKey(bones[n].path_from_id(c), -1, n) for n, channels in written.items() for c in channels]
 
 
-def _named(armature: Any, written: Written, chosen: Any) -> list[ChannelKey]:
+def named(armature: Any, written: Written, chosen: Any) -> list[ChannelKey]:
     """What a keying set names of the bones that were written. Raises InvalidInput where that is nothing."""
     found = [each for name in written for each in keying_set.channel_keys(chosen, armature.pose.bones[name])]
     if written and not found:
@@ -78,7 +94,8 @@ def _count(armature: Any, path: str) -> int:
     return len(value) if hasattr(value, "__len__") and not isinstance(value, str) else 1
 
 
-def _check_action(armature: Any) -> None:
+def check_action(armature: Any) -> None:
+    """Raises InvalidInput where the action is another file's."""
     action = armature.animation_data.action if armature.animation_data else None
     if action is not None and action.library is not None:
         raise InvalidInput(
@@ -91,10 +108,15 @@ def show_animation(armature: Any, written: Written) -> None:
     """Set channels that were keyed elsewhere to what their curves say at the current frame."""
     frame = bpy.context.scene.frame_current_final
     channel_of = _paths(armature, written)
-    for curve in compat.fcurves(armature):
-        if curve.data_path in channel_of:
-            name, channel = channel_of[curve.data_path]
-            getattr(armature.pose.bones[name], channel)[curve.array_index] = curve.evaluate(frame)
+    curves = [curve for curve in compat.fcurves(armature) if curve.data_path in channel_of]
+    if nla.has_strips(armature):
+        numbers = tuple(_id(curve) for curve in curves)
+        shown = nla.seen(armature, frame, numbers)
+    else:
+        shown = {_id(curve): curve.evaluate(frame) for curve in curves}
+    for (path, place), value in shown.items():
+        name, channel = channel_of[path]
+        getattr(armature.pose.bones[name], channel)[place] = value
 
 
 def frames(armature: Any) -> tuple[float, ...]:
@@ -102,8 +124,8 @@ def frames(armature: Any) -> tuple[float, ...]:
     found: set[float] = set()
     for curve in compat.fcurves(armature):
         if curve.data_path.startswith("pose.bones"):
-            found.update(np.round(keys_of(curve)["co"].reshape(-1, 2)[:, 0].astype(float), 4).tolist())
-    return tuple(sorted(found))
+            found.update(keys_of(curve)["co"].reshape(-1, 2)[:, 0].astype(float).tolist())
+    return tuple(sorted(set(np.round(nla.scene_frames(armature, sorted(found)), 4).tolist())))
 
 
 def remember(armature: Any, bones: Collection[str]) -> Callable[[Any], None]:

@@ -176,3 +176,47 @@ def test_a_film_solved_in_blender_is_few_keys_on_the_solved_skin(bpy: Any, empty
             assert np.linalg.norm(one - two, axis=1).max() <= 1.05e-3  # a millimetre
         session.undo()
         assert scenes.whole_state()[:-1] == before[:-1]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "channels"),
+    [
+        ("Location, Rotation & Scale", {"location", "rotation_quaternion", "scale"}),
+        ("Rotation", {"rotation_quaternion"}),
+        (None, {"location", "rotation_quaternion"}),
+    ],
+)
+def test_a_film_is_keyed_by_the_active_keying_set(
+    bpy: Any, arm: Any, chosen: str | None, channels: set[str]
+) -> None:
+    """What it names of the bones that move; what does not move is keyed as it is at the same frames."""
+    from contact_blender.compat import fcurves
+
+    sets, rig = bpy.context.scene.keying_sets_all, arm.read_rig("arm").rig
+    sets.active = None if chosen is None else next(each for each in sets if each.bl_label == chosen)
+    try:
+        arm.write_curves("arm", film(rig))
+    finally:
+        sets.active = None
+    curves = list(fcurves(armature(bpy)))
+    assert {curve.data_path.rsplit(".", 1)[-1] for curve in curves} == channels
+    assert all([point.co[0] for point in curve.keyframe_points] == list(FRAMES) for curve in curves)
+    scales = [point.co[1] for curve in curves if "scale" in curve.data_path for point in curve.keyframe_points]
+    np.testing.assert_allclose(scales, 1.0, atol=1e-5)
+
+
+def test_a_keying_set_of_single_numbers_keys_those_of_a_film(bpy: Any, arm: Any) -> None:
+    from contact_blender.compat import fcurves
+
+    own, rig = bpy.context.scene.keying_sets.new(name="elbow"), arm.read_rig("arm").rig
+    armature(bpy).pose.bones["elbow"]["grip"] = 0.25
+    own.paths.add(armature(bpy), 'pose.bones["elbow"].rotation_quaternion', index=1).use_entire_array = False
+    own.paths.add(armature(bpy), 'pose.bones["elbow"]["grip"]')
+    arm.write_curves("arm", film(rig))
+    curves = {(curve.data_path, curve.array_index): curve for curve in fcurves(armature(bpy))}
+    assert set(curves) == {('pose.bones["elbow"].rotation_quaternion', 1), ('pose.bones["elbow"]["grip"]', 0)}
+    assert all(len(curve.keyframe_points) == len(FRAMES) for curve in curves.values())
+    own.paths.clear()
+    own.paths.add(armature(bpy), "location")
+    with pytest.raises(InvalidInput, match="choose another keying set, or none"):
+        arm.write_curves("arm", film(rig))
