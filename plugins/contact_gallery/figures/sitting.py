@@ -1,7 +1,8 @@
 """A full body sits down: thighs on the seat, back to the rest, feet on the floor, hands on the knees.
 
-Contacts are strips of the body carried to chair, floor and, for the hands, to the body itself. The solve goes in
-stages as in the paper: the root first, then the legs, then arms and trunk, while who sits stays seated.
+Contacts are strips of the body carried to chair, floor and, for the hands, to the body itself. Skin stretches at
+the back of a bent hip, so the strips on the seat are stretched as much; the feet stand under the knees. The solve
+goes in stages as in the paper: the root first, then the legs, then arms and trunk, while who sits stays seated.
 """
 
 import numpy as np
@@ -29,6 +30,7 @@ STAGES = [
     },
 ]
 CLAIMS = {"seat_l": "settled", "back": "settled", "foot_l": "aligned with the floor", "hand_l": "brought inwards"}
+WEIGHTS = {"back": 2.0, "foot_l": 2.0, "foot_r": 2.0}
 BACK, FRONT, DOWN = (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)
 
 
@@ -57,12 +59,10 @@ def draw(sheet: Sheet) -> None:
             session.patches.brush(
                 "disk", name, surface="body", at=skin, radius=width, spacing=0.3 * width, axis=skin
             )
-            session.pairs.add(
-                name,
-                session.patches.transfer(name, onto, where, direction=heading),
-                name=name,
-                weight=2.0 if name == "back" else 1.0,
-            )
+            copy = session.patches.transfer(name, onto, where, direction=heading)
+            if name in SEAT:
+                session.patches.scale(copy, along=1.25)
+            session.pairs.add(name, copy, name=name, weight=WEIGHTS.get(name, 1.0))
 
         with sheet.counting(session, "Body on a chair"):
             session.surfaces.place("body", rotation((0, 1, 0), 0.0, (0.0, 0.0, 0.75)))
@@ -70,12 +70,12 @@ def draw(sheet: Sheet) -> None:
                 hip, knee = at[f"thigh_{side}"], at[f"calf_{side}"]
                 ends = np.array([hip + 0.12 * (knee - hip), hip + 0.62 * (knee - hip)])
                 seat = Locator.of(mesh["chair"]).closest([(0.1 * sign, 0.47, -0.09)]).points
-                touch(f"seat_{side}", ends, BACK, seat, "chair", FRONT, 0.04)
+                touch(f"seat_{side}", ends, BACK, seat, "chair", FRONT, 0.03)
                 heel, toe = (
                     at[f"foot_{side}"] * [1, 0, 1] + [0, 0.035, -0.01],
                     at[f"toes_{side}"] * [1, 0, 1] + [0, 0.02, 0.03],
                 )
-                ground = Locator.of(mesh["floor"]).closest([(0.11 * sign, 0.0, 0.36)]).points
+                ground = Locator.of(mesh["floor"]).closest([(0.11 * sign, 0.0, 0.28)]).points
                 touch(f"foot_{side}", np.array([heel, toe]), DOWN, ground, "floor", toe - heel, 0.02)
                 wrist, fingers = at[f"hand_{side}"], at[f"fingers_{side}"]
                 palm = np.array([wrist + 0.35 * (fingers - wrist), fingers])
@@ -89,7 +89,7 @@ def draw(sheet: Sheet) -> None:
             )
             x, y, z = rig.rest_world[rig.joint_index("head"), 1, :3]  # what of the head looks up
             gaze = LookTerm((Look("body", "head", (0.0, 100.0, 0.0), (float(x), float(y), float(z))),))
-            terms = [*paper_terms(), PenetrationTerm(), gaze]
+            terms = [*paper_terms(), PenetrationTerm(resolution=96), gaze]
             proposal, spent = timed(
                 lambda: session.solve(solver="staged", solver_settings={"stages": STAGES}, terms=terms)
             )

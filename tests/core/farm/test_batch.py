@@ -151,7 +151,7 @@ def test_a_batch_that_is_killed_goes_on_where_it_was(jobs: Path) -> None:
         "--json",
     ]
     first = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300  # compiling, on a busy machine
     while not list(out.glob(f"*/{RECEIPT}")) and time.monotonic() < deadline:
         time.sleep(0.02)
     first.kill()
