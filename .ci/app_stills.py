@@ -69,6 +69,8 @@ def stills(page: Page) -> Iterator[tuple[str, Any]]:
     page.page.locator(".contact-row:has-text('mug')").first.locator("i[class*=mdi-eye]").click()
     until(page, "() => trame.state.get('tree').some((row) => row.hidden)")
     page.key("Home")
+    turn(page, -0.22)  # the palm
+    page.key("Home")
     yield "app-heat", taken(page)
 
 
