@@ -1,7 +1,14 @@
-"""One writer for one document: a lock file that the operating system releases when its holder dies."""
+"""One writer for one document: a lock file that the operating system releases when its holder dies.
+
+On a network path the file system decides how far the lock reaches. Linux asks the server for it (NFS since version
+4, or 3 with its lock service; SMB), so that it holds between machines; a mount that keeps locks to itself
+(`nolock`, `local_lock=flock`) keeps out writers on the same machine alone, and nothing here can tell. One that
+refuses locks is said so, and the document is opened read-only. Nothing waits for a lock.
+"""
 
 from __future__ import annotations
 
+import errno
 import getpass
 import json
 import os
@@ -30,7 +37,12 @@ class DocumentLock:
             file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             return f"{path.parent} cannot be written ({error.strerror or error})"
-        if not _try_lock(file):
+        try:
+            free = _try_lock(file)
+        except OSError as error:  # a share without a lock service
+            os.close(file)
+            return f"{path.parent} takes no locks ({error.strerror or error}), so nobody can tell who writes"
+        if not free:
             os.close(file)
             return f"{document_path.name} is open in {_holder(path)}"
         os.ftruncate(file, 0)
@@ -75,24 +87,31 @@ def _holder(path: Path) -> str:
         return "another process"
 
 
+_TAKEN = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}  # what systems say where another has it
+
 if sys.platform == "win32":
     import msvcrt
 
     def _try_lock(file: int) -> bool:
-        """Lock a byte far behind the text, so that others can read who holds it."""
+        """Lock a byte far behind the text, so that others can read who holds it. Raises OSError."""
         os.lseek(file, 1 << 20, os.SEEK_SET)
         try:
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
+        except OSError as error:
+            if error.errno in _TAKEN:
+                return False
+            raise
         return True
 
 else:
     import fcntl
 
     def _try_lock(file: int) -> bool:
+        """Whether nobody else has it. Raises OSError where no lock can be had at all."""
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return False
+        except OSError as error:
+            if error.errno in _TAKEN:
+                return False
+            raise
         return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import threading
@@ -406,3 +407,27 @@ def test_files_without_an_end_are_refused_before_they_are_read(tmp_path: Path) -
         stream.truncate((1 << 30) + 1)  # a hole: no disk is used
     with pytest.raises(FileRefused, match="are refused"):
         read_only_document(huge)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="locks as POSIX has them")
+def test_a_drive_that_refuses_locks_is_named_and_opened_read_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As NFS 3 does without its lock service; nobody is blamed for having the document open."""
+    import fcntl
+
+    def refused(file: int, how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    path = tmp_path / "d.json"
+    write_document(path, ContactDocument())
+    before = path.read_bytes()
+    monkeypatch.setattr(fcntl, "flock", refused)
+    with Session.open(path, discover=False) as session:
+        assert session.read_only and "takes no locks (No locks available)" in session.notes[0]
+        with pytest.raises(FileRefused, match="takes no locks"):
+            session.save()
+    monkeypatch.undo()
+    assert path.read_bytes() == before
+    with Session.open(path, discover=False) as session:
+        assert not session.read_only
