@@ -172,6 +172,19 @@ def test_more_than_four_influences_and_a_rigid_rider(tmp_path: Path) -> None:
     assert np.allclose(asset.mesh.points[rider].min(axis=0), [1, 0, 2], atol=1e-6)
 
 
+def test_a_skeleton_that_moves_no_mesh_is_said(tmp_path: Path) -> None:
+    """It is read as an object, and whoever expected a hand is told why it is none."""
+    document = Document()
+    skinned(document)
+    with_skin = GltfFiles().read(document.save(tmp_path))
+    for node in document.json["nodes"]:
+        node.pop("skin", None)
+    without = GltfFiles().read(document.save(tmp_path, "without.gltf"))
+    assert with_skin.rig is not None and without.rig is None
+    assert any("no hand" in note for note in without.notes)
+    assert not any("no hand" in note for note in with_skin.notes)
+
+
 def test_rest_may_differ_from_bind_and_scale_is_taken_out(tmp_path: Path) -> None:
     """A rig under a node scaled by 100, bound elsewhere: the skin stands where the file's own matrices put it."""
     document = Document()

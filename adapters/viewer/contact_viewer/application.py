@@ -110,8 +110,9 @@ class Application(TreeActions, FileActions):
 
     def add(self, sources: Sequence[str | Path]) -> None:
         """Bring further meshes and rigs into the scene. Raises FileRefused."""
-        names = files.add_files(self.session, sources)
-        self.say(f"{', '.join(names)} stands beside the rest now.")
+        added = files.add_files(self.session, sources)
+        notes = dict.fromkeys(note for each in added.values() for note in each)
+        self.say(" ".join([f"{', '.join(added)} stands beside the rest now.", *notes]))
         self.see_all()
         self.interaction.prepare()
 

@@ -99,15 +99,16 @@ def _opened(host: ViewerHost, plugins: PluginManager) -> Session:
     return Session(host=host, objects=None, plugins=plugins)
 
 
-def add_files(session: Session, sources: Iterable[str | Path]) -> list[str]:
-    """Bring further meshes and rigs into the scene of a session, each beside what is there; the new surfaces.
+def add_files(session: Session, sources: Iterable[str | Path]) -> dict[str, tuple[str, ...]]:
+    """Bring further meshes and rigs into the scene of a session, each beside what is there; the new surfaces, with
+    what their readers say of them.
 
     Raises FileRefused, also where the scene is none that takes files.
     """
     host = session.host
     if not isinstance(host, ViewerHost):
         raise FileRefused("this scene belongs to another program: add the object there, and open it again.")
-    added = []
+    added = {}
     for source in sources:
         asset = read_asset(str(source), session.plugins)
         reach = _reach(session)
@@ -125,7 +126,7 @@ def add_files(session: Session, sources: Iterable[str | Path]) -> list[str]:
         )
         with contextlib.suppress(KeyError):
             session.binding.surfaces[name] = session.binding.find(session.document.surface(name), key)
-        added.append(name)
+        added[name] = asset.notes
     return added
 
 

@@ -46,6 +46,10 @@ class GltfFiles:
                 return rig_asset(gltf, nodes, parts, read_sidecar(told) if told else None, notes)
             if sidecar is not None:
                 raise FileRefused(f"{path} holds no skin, so the rig sidecar {sidecar} has no joints to describe.")
+            if gltf.document.get("skins"):
+                notes.append(
+                    "Its skeleton moves none of its meshes, so it is an object, and no hand that is posed."
+                )
             return _object_asset(path, parts, notes)
 
     def read_clips(self, path: Path, *, sidecar: Path | None = None, rate: float | None = None) -> tuple[Clip, ...]:

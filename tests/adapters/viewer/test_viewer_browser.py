@@ -34,6 +34,13 @@ from contact_viewer.recovery import Recovery
 from tests.adapters.viewer.served import CHROMIUM, IMAGE, Page, Served, serving
 from tests.adapters.viewer.viewer_scenes import Sight, application
 
+BOOK = (
+    "".join(  # three pages that share their spine
+        f"v {x} {y} {z}\n" for x, z in ((0, 0), (0.06, 0), (-0.03, 0.05), (-0.03, -0.05)) for y in (0, 0.08)
+    )
+    + "f 1 2 4 3\nf 1 2 6 5\nf 1 2 8 7\n"
+)
+
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
@@ -276,6 +283,37 @@ def test_a_dense_screen_is_drawn_and_picked_densely(browser: Any, served: Served
     page.page.wait_for_selector("text=Redo", timeout=10_000)
     page.key("Escape")
     page.until("() => !trame.state.get('help_wanted')")
+    assert page.errors == []
+    page.page.close()
+
+
+@pytest.mark.slow
+def test_trouble_is_a_sentence_in_the_page(browser: Any, served: Served) -> None:
+    """A file that is cut off, a solve without pairs; and a thing that is no closed surface is painted on."""
+    (served.folder / "cut.glb").write_bytes(b"glTF\x02\x00\x00\x00\x00\x10\x00\x00")
+    (served.folder / "book.obj").write_text(BOOK)
+    page = Page.opened(browser, served.address)
+
+    def bring(name: str, says: str) -> None:
+        page.page.locator("button[title='Open (Ctrl+O)']").click()
+        page.page.locator(".v-dialog input[type=text]").first.fill(str(served.folder / name))
+        page.page.locator("button:has-text('Add to the scene')").click()
+        page.until(f"() => trame.state.get('line').includes({json.dumps(says)})")
+
+    before = page.state("tree")
+    bring("cut.glb", "damaged")
+    assert page.state("tree") == before
+    page.key("Space")
+    page.until("() => trame.state.get('refusal').includes('no pair yet')")
+    bring("book.obj", "book stands beside the rest now.")
+    page.key("Home")
+    page.page.locator(".contact-row:has-text('book')").click()
+    page.key("b")
+    page.drag((0.80, 0.5), (0.82, 0.5), (0.84, 0.5))
+    page.until_patches(1)
+    for _ in range(2):
+        page.key("Control+z")
+    page.until(f"() => trame.state.get('tree').length === {len(before)}")
     assert page.errors == []
     page.page.close()
 

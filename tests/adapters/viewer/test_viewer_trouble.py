@@ -6,8 +6,11 @@ import contextlib
 import signal
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("vtkmodules")
@@ -102,6 +105,48 @@ def test_a_solve_that_cannot_be_is_a_sentence(hand: Hand) -> None:
     assert "no pair yet" in app.refusal()
     hand.key("Ctrl+Z")
     assert document_to_json(app.session.document) == document_to_json(document)
+
+
+def by(pixel: Any, right: float, down: float) -> Any:
+    """(2,) a pixel so far from another."""
+    return pixel + np.array([right, down])
+
+
+def test_a_thing_that_is_no_closed_surface_is_worked_on(tmp_path: Path) -> None:
+    """Three pages that share their spine: painted across it, moved over it, met by the hand, without a mistake."""
+    sheets = ((0.06, 0.0), (-0.03, 0.05), (-0.03, -0.05))
+    points = [(0.0, 0.01 * k, 0.0) for k in range(9)]
+    points += [(u * x / 6, 0.01 * k, u * z / 6) for x, z in sheets for u in range(1, 7) for k in range(9)]
+    columns = [(0, *range(1 + 6 * page, 7 + 6 * page)) for page in range(3)]
+    quads = [(9 * a + k, 9 * a + k + 1, 9 * b + k + 1, 9 * b + k) for page in columns
+             for a, b in pairwise(page) for k in range(8)]  # fmt: skip
+    lines = [f"v {x} {y} {z}" for x, y, z in points] + ["f " + " ".join(str(k + 1) for k in q) for q in quads]
+    (tmp_path / "book.obj").write_text("\n".join(lines))
+    app = application(["sample:human_hand", str(tmp_path / "book.obj")], tmp_path / "state")
+    hand = Hand(app)
+    hand.key("Home")
+    palm, spine = (
+        hand.on_thing("human_hand"),
+        hand.pixel(app.interaction.desk.scene.surfaces["book"].points[:9].mean(axis=0)),
+    )
+    hand.key("B")
+    hand.drag(palm, by(palm, 3, 8), by(palm, 6, 16))
+    hand.key("T")
+    hand.drag(by(spine, 9, 0), by(spine, 9, -12), by(spine, 9, -24))
+    assert len(app.session.document.pairs) == 1, app.refusal()
+    hand.key("Space")
+    hand.wait()
+    hand.key("Enter")
+    assert app.undo_name() == "Solve", app.refusal()
+    (met,) = [patch.name for patch in app.session.document.patches.values() if patch.surface == "book"]
+    app.interaction.select(met, surface="book")
+    hand.key("G")
+    at = hand.on_patch(met)
+    hand.drag(at, by(at, -10, 0), by(at, -30, 0))
+    hand.key("Shift+H")  # what is inside of a thing that has no inside
+    hand.key("Ctrl+Z")
+    assert "mistake" not in app.refusal() + app.line()
+    app.close()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="files are bounded by POSIX systems alone")

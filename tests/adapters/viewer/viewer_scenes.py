@@ -53,7 +53,7 @@ class Sight:
         """(2,) a pixel of a patch, a share of the way along its axis, aside from it by nothing."""
         shown = self.app.interaction.desk.shown
         seen = self.app.interaction.desk.scene.surfaces[self.app.session.document.patch(name).surface]
-        points = seen.positions(shown.axis(name).points)
+        points = seen.positions(shown.axis_points(name))
         return self.pixel(points[round(share * (len(points) - 1))])
 
     def on_thing(self, surface: str) -> Any:
