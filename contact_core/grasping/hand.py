@@ -194,7 +194,7 @@ class Hand:
             before = placed
             for b in range(first, end):
                 turn = np.tile(np.eye(4), (n, 1, 1))
-                turn[:, :3, :3] = [turn_about(self.axes[b], angle) for angle in angles[:, b]]
+                turn[:, :3, :3] = turns_about(self.axes[b], angles[:, b])
                 if b == self.firsts[digit]:
                     turn[:, :3, :3] = turns[:, digit] @ turn[:, :3, :3]
                 link = np.vstack([self.links[b], [0.0, 0.0, 0.0, 1.0]])
@@ -516,7 +516,13 @@ def _padded(values: FloatArray, count: int) -> FloatArray:
 
 
 def turn_about(axis: FloatArray, angle: float) -> FloatArray:
-    """(3, 3) turn about a unit axis (Rodrigues)."""
+    """(3, 3) turn about a unit axis."""
+    return turns_about(axis, np.array([angle]))[0]
+
+
+def turns_about(axis: FloatArray, angles: FloatArray) -> FloatArray:
+    """(n, 3, 3) turns about one unit axis by angles (n,) (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+    bent = angles[:, None, None]
+    return np.asarray(np.eye(3) + np.sin(bent) * cross + (1.0 - np.cos(bent)) * (cross @ cross))

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import BoolArray, FloatArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.geometry.inside import Sunk, depth_inside
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
@@ -134,12 +134,22 @@ def bones_through(bones: FloatArray, mesh: TriangleMesh) -> BoolArray:
 
 def skin_stretch(rest: TriangleMesh, skin: TriangleMesh, percentile: float) -> float:
     """A percentile of posed / rest length over the edges of the skin (1: nothing stretches)."""
-    ends = np.sort(rest.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    a, b = np.unique(ends, axis=0).T
-    before = np.linalg.norm(rest.points[b] - rest.points[a], axis=1)
+    a, b, before = _edges(rest)
     after = np.linalg.norm(skin.points[b] - skin.points[a], axis=1)
-    real = before > 1e-6 * rest.bounding_box_diagonal
-    return float(np.percentile(after[real] / before[real], percentile)) if real.any() else 1.0
+    return float(np.percentile(after / before, percentile)) if len(a) else 1.0
+
+
+def _edges(mesh: TriangleMesh) -> tuple[IntArray, IntArray, FloatArray]:
+    """Both ends (e,) of every edge that has a length, and that; found once for a mesh."""
+    if _edges not in mesh.kept:
+        ends = np.sort(mesh.faces.astype(np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        codes = np.unique(ends[:, 0] * len(mesh.points) + ends[:, 1])
+        a, b = codes // max(len(mesh.points), 1), codes % max(len(mesh.points), 1)
+        size = np.linalg.norm(mesh.points[b] - mesh.points[a], axis=1)
+        real = size > 1e-6 * mesh.bounding_box_diagonal
+        mesh.kept[_edges] = a[real], b[real], size[real]
+    kept: tuple[IntArray, IntArray, FloatArray] = mesh.kept[_edges]
+    return kept
 
 
 def joint_changes(rest_local: FloatArray, local: FloatArray) -> FloatArray:

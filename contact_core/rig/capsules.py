@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from contact_core.rig.rig import Rig
 
 FITTED_SHARE = 0.7  # of the median distance from skin to bone: capsules stay within flesh that gives
 LEAST_VERTICES = 6
+
+_FITTED: WeakKeyDictionary[Rig, dict[float, Capsules]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +36,15 @@ class Capsules:
 
 
 def fit_capsules(rig: Rig, share: float = FITTED_SHARE) -> Capsules:
-    """Capsules along the bones: axis from the joint's origin through its skin, radius `share` of the median."""
+    """Capsules along the bones: axis from the joint's origin through its skin, radius `share` of the median. Found
+    once for a rig."""
+    known = _FITTED.setdefault(rig, {})
+    if share not in known:
+        known[share] = _fitted(rig, share)
+    return known[share]
+
+
+def _fitted(rig: Rig, share: float) -> Capsules:
     points = rig.surface.points
     owner = rig.skin_joints[np.arange(len(points)), rig.skin_weights.argmax(axis=1)]
     joints, ends, radii = [], [], []

@@ -191,6 +191,26 @@ def test_self_collision_parts_fingers() -> None:
     assert values[1] < 0.2 * values[0], values
 
 
+def test_self_collision_leaves_out_pairs_that_cannot_move_against_one_another() -> None:
+    """With one finger free it varies as with all free: what is left out is constant, and most pairs are."""
+    crossed = pulled_together()
+    pose = LevenbergMarquardt().solve(crossed).poses["hand-like"]
+    whole = PoseProblem((Body.skinned(rigs.hand_like(), pose=pose),), (), terms=(SelfCollisionTerm(),))
+    fingers = ["finger1_0", "finger1_1", "finger1_2"]
+    some = replace(whole, free={"hand-like": fingers}, length=whole.manipulator_length)
+    rows = np.searchsorted(whole.free_of_body[0], some.free_of_body[0])
+    random, apart = np.random.default_rng(0), []
+    for _ in range(6):
+        theta, moved = whole.start.copy(), some.start + random.normal(scale=0.2, size=len(some.start))
+        theta[rows] = moved
+        apart.append(whole.value(whole.state(theta)) - some.value(some.state(moved)))
+    assert np.ptp(apart) < 1e-12 and abs(apart[0]) < 1.0
+    (all_pairs,), (own_pairs,) = (
+        [body.pairs for body in problem.bound_terms["self-collision"].bodies] for problem in (whole, some)
+    )
+    assert 0 < len(own_pairs) < 0.7 * len(all_pairs)
+
+
 def test_pin_and_look_reach_their_targets() -> None:
     rig = rigs.tentacle(8)
     target = (9.0, 6.0, 4.0)

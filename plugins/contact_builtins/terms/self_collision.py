@@ -9,7 +9,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
-from contact_core.rig.capsules import closest_on_segments, fit_capsules
+from contact_core.rig.capsules import Capsules, closest_on_segments, fit_capsules
 from contact_core.rig.skinning import joint_track
 from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
@@ -61,7 +61,11 @@ class _SelfCollision(LeastSquares):
                 joints = np.repeat(capsules.joints, 2)
                 track = joint_track(joints, capsules.ends.reshape(-1, 3), int(problem.bone_offsets[index]))
                 self.bodies.append(
-                    _Capsuled(track, uniform_scale(body.world_from_rig) * capsules.radii, capsules.pairs)
+                    _Capsuled(
+                        track,
+                        uniform_scale(body.world_from_rig) * capsules.radii,
+                        _moving(problem, index, capsules),
+                    )
                 )
         if not self.bodies:
             raise InvalidInput("the self-collision term needs a skinned body that moves, but the problem has none.")
@@ -85,6 +89,22 @@ class _SelfCollision(LeastSquares):
         if kept is None:
             kept = state.memory[self] = [_overlap(state, body) for body in self.bodies]
         return kept
+
+
+def _moving(problem: PoseProblem, index: int, capsules: Capsules) -> IntArray:
+    """(p, 2) the pairs whose capsules can move against one another: between them a joint is free. A body whose
+    hand alone is posed has few such."""
+    body, chart = problem.bodies[index], problem.charts[index]
+    if body.black_box is not None:
+        return capsules.pairs
+    free = np.zeros(len(body.rig.joints), bool)
+    free[chart.joint_of_dof[problem.free_of_body[index]]] = True
+    part = np.full(len(free), -1)  # by joint, the nearest free one at or above it; a root moves all alike
+    for joint, parent in enumerate(body.rig.parents):
+        if parent >= 0:
+            part[joint] = joint if free[joint] else part[parent]
+    first, second = part[capsules.joints[capsules.pairs]].T
+    return capsules.pairs[first != second]
 
 
 def _overlap(state: PoseState, body: _Capsuled) -> _Overlap:
