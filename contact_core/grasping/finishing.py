@@ -33,7 +33,7 @@ from contact_core.grasping.posed_scene import posed_scene_in
 from contact_core.grasping.scene import GraspScene, hand_share
 from contact_core.grasping.screening import seen_from
 from contact_core.grasping.slots import GraspFacts, GraspScore, Kind
-from contact_core.grasping.verdict import Verdict, judge, judge_hold
+from contact_core.grasping.verdict import Verdict, judge, judge_hold, margin
 from contact_core.plugins.registry import PLACERS
 from contact_core.plugins.slots import PlacementRequest
 from contact_core.proposals.draft import Draft
@@ -205,7 +205,7 @@ def judged(
     way = placed[:3, :3] @ hand.frame[:, 0]
     facts = GraspFacts(
         kind, metrics, metrics["closure"], comfort(hand, angles),
-        clearance(hand, scene.field, placed, way), verdict.failures,
+        clearance(hand, scene.field, placed, way), verdict.failures, margin(metrics, kind),
     )  # fmt: skip
     command = Macro(f"{kind.capitalize()} grasp", draft.commands)
     proposal = Proposal(

@@ -110,7 +110,8 @@ class GraspFacts:
     """What is known of one solved grasp. metrics: those of `report.json`. kind: the one asked for.
 
     closure: Ferrari-Canny quality. comfort: 0 to 1, 1 where joints are in the middle of their room and bent alike.
-    clearance: 0 to 1, the share of the way back out that the open hand finds free.
+    clearance: 0 to 1, the share of the way back out that the open hand finds free. margin: 0 to 1, how clear it is
+    of the verdict's limits (`verdict.margin`).
     """
 
     kind: Kind
@@ -119,6 +120,7 @@ class GraspFacts:
     comfort: float
     clearance: float
     failures: tuple[str, ...]
+    margin: float = 1.0
 
 
 @runtime_checkable

@@ -110,6 +110,7 @@ PADS_PLACED = {"power": 0.5, "precision": 0.6, "pinch": 0.6, "hook": 0.4, "later
 OPPOSED = {"power": 100.0, "precision": 100.0, "pinch": 110.0, "lateral": 80.0, "hook": -np.inf}  # degrees
 SKIN_THROUGH = 0.025
 UNEVEN = 65.0  # degrees
+CLEAR, LEAST_SCALE = 0.06, 0.05  # of a limit: what is farther from it is clear of it; what a limit counts at least
 CROSSING = 0.35  # of how near bones of two digits may come
 
 
@@ -141,6 +142,26 @@ def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
     if metrics["uneven_curl_deg"] > UNEVEN:
         failures.append(f"neighbouring fingers are bent {metrics['uneven_curl_deg']:.0f} degrees apart")
     return tuple(failures)
+
+
+def margin(metrics: Mapping[str, Any], kind: str) -> float:
+    """0 to 1: how far a grasp of a kind that passes is from the limit nearest to it, as a share of that limit,
+    and 1 from `CLEAR` on; 0 at a limit or beyond. Counts have no margin. The last bits of a processor decide
+    the verdict of a grasp that has none."""
+    limits = [(metrics.get(key), sign, limit) for key, (sign, limit) in ACCEPT.items()]
+    limits += [
+        (metrics.get("closure"), ">=", CLOSURE[kind]),
+        (metrics.get("opposition_deg"), ">=", OPPOSED[kind]),
+        (metrics.get("crossing"), "<=", CROSSING),
+        (metrics.get("skin_through"), "<=", SKIN_THROUGH),
+        (metrics.get("uneven_curl_deg"), "<=", UNEVEN),
+    ]
+    shares = [
+        (limit - value if sign == "<=" else value - limit) / max(abs(limit), LEAST_SCALE)
+        for value, sign, limit in limits
+        if value is not None and np.isfinite(limit) and (limit or sign == ">=")  # no bones through is a count
+    ]
+    return float(np.clip(min(shares, default=CLEAR) / CLEAR, 0.0, 1.0))
 
 
 def holds(key: str, value: float, limit: float) -> bool:

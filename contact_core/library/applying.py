@@ -43,6 +43,7 @@ from contact_core.solve.solver import PoseSolution, SolveStatus
 
 THICKER = 0.3, 3.0  # how far the ratio of a digit's thickness goes from that of the hands
 SOLVED, MOST = 2, 4  # of the fitted places for one grasp: where one of them is good, and where none is
+SURE = 0.5  # margin from which a grasp is good for sure
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,8 @@ def apply(
     score = scene.plugins.make(GRASP_SCORES, scene.plugins.name_for(GRASP_SCORES, "grasp", None))
     found = list[Applied]()
     for place, (unlike, local) in enumerate(ranked):
-        enough = len(found) >= (SOLVED if count == 1 else count) and any(one.suggestion.is_grasp for one in found)
+        sure = any(one.suggestion.is_grasp and one.suggestion.facts.margin >= SURE for one in found)
+        enough = len(found) >= (SOLVED if count == 1 else count) and sure
         if enough or place >= max(MOST, count):
             break
         progress.tell(0.3 + 0.7 * place / len(ranked), "Solving and settling")

@@ -19,10 +19,11 @@ class Balanced(HasSettings):
     name: ClassVar[str] = "balanced"
     summary: ClassVar[str] = "contact, hold, comfort and a free way out, weighed"
     contact: float = setting(1.0, low=0.0, help="what close contact of many pads counts")
-    hold: float = setting(0.6, low=0.0, help="what digits that touch and closure count")
+    hold: float = setting(1.0, low=0.0, help="what digits that touch and closure count")
     comfort: float = setting(0.7, low=0.0, help="what joints in the middle of their room and like bends count")
     loop: float = setting(0.25, low=0.0, help="what each finger through the loop at the place to hold counts")
-    along: float = setting(0.5, low=0.0, help="what a thumb costs that lies along what the fingers go round")
+    along: float = setting(0.7, low=0.0, help="what a thumb costs that lies along what the fingers go round")
+    margin: float = setting(0.3, low=0.0, help="what it costs that the verdict hangs on a limit")
     clearance: float = setting(0.3, low=0.0, help="what a free way out counts")
 
     def score(self, facts: GraspFacts) -> float:
@@ -34,5 +35,7 @@ class Balanced(HasSettings):
         value = self.contact * contact + self.hold * hold + self.comfort * facts.comfort
         if facts.kind not in ("pinch", "lateral"):
             value -= self.along * m["thumb_along"]
+        if not facts.failures:
+            value -= self.margin * (1.0 - facts.margin)
         value += self.loop * min(m["digits_through"], 4)
         return float(value + self.clearance * facts.clearance - FAILURE * len(facts.failures))

@@ -24,7 +24,7 @@ from contact_core.grasping.facts import (
 from contact_core.grasping.filled import filled
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.slots import KINDS
-from contact_core.grasping.verdict import judge_hold
+from contact_core.grasping.verdict import judge_hold, margin
 from contact_core.rig.rig import forward_kinematics, skin
 from contact_core.testing import meshes
 from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
@@ -203,3 +203,15 @@ def test_a_thumb_at_rest_beside_a_rod_is_along_it_and_one_without_a_rod_is_not()
     normals = np.cross(tip, np.random.default_rng(0).normal(size=(1, 9, 3)))
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
     assert along(normals, np.ones((1, 9), bool), tip[None])[0] > 0.95
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_margin_is_nothing_at_a_limit_and_whole_far_from_all(kind: str) -> None:
+    clear = {**GOOD, "gap": 0.003, "opposition_deg": 160.0, "closure": 0.1, "crossing": 0.0}
+    clear |= {"skin_through": 0.0, "uneven_curl_deg": 10.0, "bones_through": 0, "opposed_normals": 1.0}
+    assert margin(clear, kind) == 1.0
+    assert margin({**clear, "gap": 0.015}, kind) == 0.0 and margin({**clear, "gap": 0.02}, kind) == 0.0
+    assert 0.0 < margin({**clear, "gap": 0.0135}, kind) < 1.0
+    if kind in ("power", "precision"):
+        assert margin({**clear, "opposition_deg": 101.0}, kind) < 0.2
+        assert margin({**clear, "opposition_deg": 98.0}, kind) == 0.0
