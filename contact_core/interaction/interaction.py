@@ -190,6 +190,8 @@ class Interaction(Holding):
         if gesture is None:
             self.desk.roll_back()
             self._camera_has.add(event.button)
+            if self.desk.remark:
+                self._touch("status")
             return False
         self._begin(gesture, event.button)
         return True
@@ -273,6 +275,12 @@ class Interaction(Holding):
                     return  # the gesture was the last thing done
             self._own_actions().get(action, lambda: EDITS[action](self.desk))()
         self._touch("overlay", "selection", "status", "settings", "visibility", "work", "film")
+
+    def forgive(self) -> None:
+        """What was refused last is told no more: for front ends, when an action of their own comes after it."""
+        if self._refusal:
+            self._refusal = ""
+            self._touch("status")
 
     def solve_frames(self, frames: Sequence[float]) -> None:
         """Begin to solve frames beside the window; see `Proposing.solve_frames`, and what it raises."""

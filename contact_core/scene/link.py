@@ -135,13 +135,13 @@ class HostLink:
     def undo(self) -> None:
         """The host's undo. Raises CommandRejected when the host has nothing to undo."""
         if self._undo is None or not self._undo.undo():
-            raise CommandRejected("there is nothing to undo in the host.")
+            raise CommandRejected("there is nothing to undo.")
         self.follow()
 
     def redo(self) -> None:
         """The host's redo. Raises CommandRejected when the host has nothing to redo."""
         if self._undo is None or not self._undo.redo():
-            raise CommandRejected("there is nothing to redo in the host.")
+            raise CommandRejected("there is nothing to redo.")
         self.follow()
 
     def follow(self) -> None:

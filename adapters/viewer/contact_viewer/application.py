@@ -171,6 +171,7 @@ class Application(TreeActions, FileActions):
                 raise InvalidInput(f"there is no action {action!r}.")
             if known[action].by_host:
                 self.notes.clear()
+                self.interaction.forgive()
                 self._own(action)
             else:
                 self.interaction.do(action)

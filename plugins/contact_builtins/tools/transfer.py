@@ -58,6 +58,8 @@ class Transfer(HasSettings):
         if source is None or pointer.holds("ctrl"):
             found = patch_under(desk, pointer)
             if found is None:
+                if source is None and desk.pick(pointer) is not None:
+                    desk.remark = "no contact is active, so none is transferred: paint one, or click one first."
                 return None
             desk.take(found[0])
             return Gesture()

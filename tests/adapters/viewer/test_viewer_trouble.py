@@ -107,6 +107,24 @@ def test_a_solve_that_cannot_be_is_a_sentence(hand: Hand) -> None:
     assert document_to_json(app.session.document) == document_to_json(document)
 
 
+def test_what_was_refused_is_gone_with_the_next_action(tmp_path: Path) -> None:
+    app = application(["sample:human_hand"], tmp_path)
+    hand = Hand(app)
+    for key in ("Home", "3", "?", "?"):
+        hand.key("Ctrl+Z")
+        assert app.refusal() == "there is nothing to undo."
+        hand.key(key)
+        assert not app.refusal(), key
+    hand.key("Home")
+    hand.key("T")
+    at = hand.on_thing("human_hand")
+    hand.drag(at, by(at, 9, 0))  # turns the camera, and says why it copies nothing
+    assert "no contact is active" in app.line()
+    hand.key("Q")
+    assert "no contact is active" not in app.line()
+    app.close()
+
+
 def by(pixel: Any, right: float, down: float) -> Any:
     """(2,) a pixel so far from another."""
     return pixel + np.array([right, down])

@@ -179,6 +179,8 @@ class WebApplication:
         def told(name: str) -> Callable[[Callable[..., object]], Callable[..., None]]:
             def wrap(act: Callable[..., object]) -> Callable[..., None]:
                 def run(*arguments: Any) -> None:
+                    if name != "key":  # which may be none of ours
+                        app.interaction.forgive()
                     app.attempt(lambda: act(*arguments))
                     if self.stream is not None:
                         self.stream.wake()
