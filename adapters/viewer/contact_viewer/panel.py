@@ -257,8 +257,10 @@ def report(meets: list[Residual], document: ContactDocument) -> dict[str, Any]:
         head = "No pairs yet."
     elif bad:
         head = f"{bad} of {len(meets)} contacts miss."
+    elif fair == len(meets):
+        head = f"All {fair} contacts nearly touch." if fair > 1 else "The contact nearly touches."
     elif fair:
-        head = f"All {len(meets)} contacts are near, {fair} of them not quite."
+        head = f"{len(meets) - fair} of {len(meets)} contacts touch, the others nearly."
     else:
         head = f"All {len(meets)} contacts touch."
     return {"head": head, "rows": rows}
