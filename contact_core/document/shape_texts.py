@@ -38,13 +38,13 @@ def shape_text(shape: PatchShape) -> Fragment:
     return _shape_texts[shape]
 
 
-def keep_texts(shapes: Mapping[str, PatchShape], texts: Mapping[str, str]) -> None:
+def keep_texts(shapes: Mapping[str, PatchShape], texts: Mapping[str, Fragment]) -> None:
     """Keep the texts that shapes were read from; texts: by key, canonical."""
     for key, text in texts.items():
-        _shape_texts[shapes[key]] = Fragment(text)
+        _shape_texts[shapes[key]] = text
 
 
-def cut_out(text: str) -> tuple[str, dict[str, str]] | None:
+def cut_out(text: str) -> tuple[str, dict[str, Fragment]] | None:
     """A document's JSON with `CUT` for its shapes, and the text of each shape by key; None where it does not lie as
     `pretty` lays it out. Raises ValueError where a key is none.
 
@@ -54,7 +54,7 @@ def cut_out(text: str) -> tuple[str, dict[str, str]] | None:
     end = text.find(_END, start + len(_START))
     if start < 0 or end < 0 or text.find(_START, end) >= 0 or CUT in text:
         return None
-    texts: dict[str, str] = {}
+    texts: dict[str, Fragment] = {}
     pieces = (text[start + len(_START) : end] + ",\n").split(_BETWEEN)
     for piece in pieces[:-1]:
         if not piece.startswith('  "'):
@@ -62,7 +62,7 @@ def cut_out(text: str) -> tuple[str, dict[str, str]] | None:
         key, after = _read(piece, 2)
         if piece[after : after + 2] != ": " or key in texts:
             return None
-        texts[key] = piece[after + 2 :] + "\n  }"
+        texts[key] = Fragment(piece[after + 2 :] + "\n  }")
     if pieces[-1]:
         return None
     return f'{text[:start]}\n "shapes": {json.dumps(CUT)}{text[end + len(_END) :]}', texts

@@ -26,6 +26,7 @@ SCHEMA = "contact-core.journal"
 VERSION = 1
 ID_DIGITS = 8
 MAX_BYTES = 4 << 30
+_DOCUMENT = b',"document":'
 
 UPGRADES: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}  # of the first line, by version
 
@@ -59,7 +60,8 @@ class JournalContents:
 
     first: the line with the document that it begins with, None where it is lost. lines: the events, in order.
     damage: None, or a sentence on what is lost. cut_off: whether damage follows the last of the lines. name: of the
-    file.
+    file. beside: the canonical bytes of a document and the document: where the first line holds those very bytes,
+    they are not decoded again.
     """
 
     first: Line | None
@@ -68,10 +70,22 @@ class JournalContents:
     damage: str | None
     cut_off: bool
     name: str
+    beside: tuple[bytes, ContactDocument] | None = None
+
+    @cached_property
+    def _header(self) -> bytes | None:
+        """The first line up to its document, where that is the one beside the journal."""
+        if self.first is None or self.beside is None:
+            return None
+        ending = _DOCUMENT + _one_line(self.beside[0]) + b"}"
+        return self.first.text.removesuffix(ending) if self.first.text.endswith(ending) else None
 
     @cached_property
     def _head(self) -> tuple[Mapping[str, Any], int, str | None]:
-        return ({}, 0, None) if self.first is None else _read_head(self.first.event, self.name)
+        if self.first is None:
+            return {}, 0, None
+        first = self.first if self._header is None else Line(1, self.journal_id, self._header + b"}")
+        return _read_head(first.event, self.name)
 
     @property
     def base_revision(self) -> int:
@@ -92,6 +106,8 @@ class JournalContents:
         """
         if self.first is None:
             return None
+        if self._header is not None and self.beside is not None and self._head:
+            return self.beside[1]
         return document_from_json(self._head[0].get("document"), f"the document in {self.name}")
 
     @property
@@ -125,8 +141,11 @@ class JournalContents:
         return sum("do" in event or "goto" in event for event in self.events)
 
 
-def read_journal(path: Path) -> JournalContents:
-    """The sound lines of a journal. Raises FileRefused when there is none, or for a newer journal."""
+def read_journal(path: Path, beside: tuple[bytes, ContactDocument] | None = None) -> JournalContents:
+    """The sound lines of a journal. Raises FileRefused when there is none, or for a newer journal.
+
+    beside: the document file's canonical bytes and its document, as in `JournalContents`.
+    """
     found = [decode_line(raw) for raw in _raw_lines(read_bounded(path, MAX_BYTES))]
     sound = [line for line in found if line is not None]
     if not sound:
@@ -141,7 +160,7 @@ def read_journal(path: Path) -> JournalContents:
     damage = _damage(path.name, sorted(lines), cut_off, in_order)
     head = lines.pop(1, None)
     events = tuple(lines[number] for number in sorted(lines))
-    contents = JournalContents(head, journal_id, events, damage, cut_off, path.name)
+    contents = JournalContents(head, journal_id, events, damage, cut_off, path.name, beside)
     if not contents.closed:
         _ = contents.base  # refused now where it is none
     return contents
@@ -158,7 +177,11 @@ def encode_head(header: Mapping[str, Any], document: bytes, journal_id: str) -> 
     Line ends within JSON lie between its words, because a text spells them as escapes: a blank does the same.
     """
     start = json.dumps(header, separators=(",", ":"), allow_nan=False).encode().removesuffix(b"}")
-    return _line(b'%b,"document":%b}' % (start, document.replace(b"\n", b" ")), 1, journal_id)
+    return _line(start + _DOCUMENT + _one_line(document) + b"}", 1, journal_id)
+
+
+def _one_line(document: bytes) -> bytes:
+    return document.replace(b"\n", b" ")
 
 
 def _line(text: bytes, number: int, journal_id: str) -> bytes:

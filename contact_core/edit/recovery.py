@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from contact_core.atomic_file import read_bounded, remove_leftovers, write_atomic
@@ -175,20 +175,23 @@ def _set_aside(beside: Path, old: JournalContents) -> str | None:
 
 
 def _open_locked(path: Path, lock: DocumentLock, commands: CommandTable) -> OpenedFile:
-    old, notes = _read_old_journal(journal_path(path))
-    found = _Found(path, lock, notes)
+    found, refused = _Found(path, lock, []), None
     try:
         if path.exists():
-            raw = read_bounded(path, MAX_BYTES)
-            found = _Found(path, lock, notes, *parse_with_content(raw, str(path)))
+            found = _Found(path, lock, found.notes, *parse_with_content(read_bounded(path, MAX_BYTES), str(path)))
     except FileRefused as error:
-        if old is None or isinstance(error, EditedFile) or "newer contact-core" in str(error):
-            raise  # what can be read is somebody's edit, perhaps
+        refused = error
+    old = _read_old_journal(found)
+    if refused is not None:
+        if old is None or isinstance(refused, EditedFile) or "newer contact-core" in str(refused):
+            raise refused  # what can be read is somebody's edit, perhaps
         replayed = _replay(old, commands, None)
         if replayed is None:
-            raise
-        notes.append(f"{error} It is kept as {_keep(path, 'damaged').name}; the journal holds the document.")
-        return _resume(_Found(path, lock, notes, damaged=True), old, replayed)
+            raise refused
+        found.notes.append(
+            f"{refused} It is kept as {_keep(path, 'damaged').name}; the journal holds the document."
+        )
+        return _resume(replace(found, damaged=True), old, replayed)
     if old is not None and not old.closed:
         replayed = _replay(old, commands, found.saved)
         if replayed is not None and _belongs(old, replayed, found):
@@ -235,15 +238,17 @@ def _names(old: JournalContents, digest: str | None) -> bool:
     return (old.first is not None and digest == old.file_digest) or digest in old.saved_revisions
 
 
-def _read_old_journal(beside: Path) -> tuple[JournalContents | None, list[str]]:
-    if not beside.exists():
-        return None, []
+def _read_old_journal(found: _Found) -> JournalContents | None:
+    """The journal beside a document, None without one; one that is none is kept, and a note says so."""
+    if not found.journal.exists():
+        return None
     try:
-        return read_journal(beside), []
+        return read_journal(found.journal, None if found.content is None else (found.content, found.document))
     except FileRefused as error:
         if "newer contact-core" in str(error):
             raise
-        return None, [f"{error} It is kept as {_keep(beside, 'damaged').name}."]
+        found.notes.append(f"{error} It is kept as {_keep(found.journal, 'damaged').name}.")
+        return None
 
 
 def _resume(found: _Found, old: JournalContents, replayed: Replayed) -> OpenedFile:

@@ -357,3 +357,11 @@ def test_what_is_missing_is_named_with_what_is_near() -> None:
         document.patch(name + "x")
     with pytest.raises(CommandRejected, match="has no patch at all"):
         ContactDocument().patch("thumb")
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), other=st.integers(0, 10**6))
+def test_documents_are_the_same_exactly_where_their_files_are(seed: int, other: int) -> None:
+    a, b = random_document(seed), random_document(other)
+    for x, y in ((a, copy.deepcopy(a)), (a, b), (a, replace(a, extras=b.extras)), (a, replace(b, shapes=a.shapes))):
+        assert same_documents(x, y) == (dump_document(x) == dump_document(y))

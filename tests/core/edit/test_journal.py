@@ -339,3 +339,29 @@ def test_opening_what_was_closed_in_order_costs_its_document_once(
     path.unlink()
     replayed = replay(read_journal(journal_path(path))).history
     assert same_documents(replayed.base, document) and replayed.document.extras["number"] == 1
+
+
+def test_edits_that_were_not_saved_are_recovered_without_decoding_their_document_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The journal begins with the very bytes of the file: what they say is known. What nobody edited is shared."""
+    path = tmp_path / "d.json"
+    with Session.open(path) as session:
+        fill(session, 5)
+        session.save()
+    session = Session.open(path)
+    session.do(SetExtra("number", 1))
+    meant = session.timed_document
+    interrupt(session)
+    decoded: list[str] = []
+    real = journal_file.document_from_json
+    monkeypatch.setattr(
+        journal_file, "document_from_json", lambda *given: (decoded.append(given[1]), real(*given))[1]
+    )
+    with Session.open(path) as session:
+        assert same_documents(session.timed_document, meant) and not decoded
+        assert session.notes and session.history.base_revision == 0
+    whole = read_journal(journal_path(path))
+    other = ContactDocument()
+    beside = read_journal(journal_path(path), (dump_document(other), other))  # another document than the line has
+    assert same_documents(whole.base or other, beside.base or other) and len(decoded) == 2
