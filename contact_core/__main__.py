@@ -31,12 +31,23 @@ def _interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
     if unraisable.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(unraisable)
         return
-    from _thread import interrupt_main
     from threading import Timer
 
-    again = Timer(0.02, interrupt_main)
+    again = Timer(0.02, _interrupt_main)
     again.daemon = True  # a program that ends meanwhile needs no interrupt
     again.start()
+
+
+def _interrupt_main() -> None:
+    """Interrupt the main thread, also where it sleeps or reads: a flag that is set wakes nobody."""
+    from _thread import interrupt_main
+    from threading import main_thread
+
+    thread = main_thread().ident
+    if sys.platform != "win32" and thread is not None:
+        signal.pthread_kill(thread, signal.SIGINT)
+    else:
+        interrupt_main()
 
 
 if __name__ == "__main__":

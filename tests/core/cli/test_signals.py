@@ -115,6 +115,7 @@ def test_an_interrupt_that_python_drops_comes_again() -> None:
         "sys.exit(program.main())"
     )
     run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, preexec_fn=_heed_interrupts, check=False
-    )
+        [sys.executable, "-c", code],
+        capture_output=True, text=True, preexec_fn=_heed_interrupts, check=False, timeout=20,  # it wakes who sleeps
+    )  # fmt: skip
     assert (run.returncode, run.stderr) == (130, "")
