@@ -23,7 +23,7 @@ DIRECTIONS = 96
 ROUND = (
     0.1  # by how much normals vary more across a thing than along it, as mean squares, where it is round for sure
 )
-LOOP_REACH = 0.2  # hand lengths from the place that is to be held to a finger through the loop there
+LOOP_REACH = 0.3  # hand lengths from the place that is to be held to a finger through the loop there
 BACK = (0.06, 0.12, 0.2, 0.3)  # hand lengths of the way back out
 
 
@@ -157,14 +157,20 @@ def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray
 
 
 def through_loops(
-    hand: Hand, frames: FloatArray, field: DistanceField, solid: DistanceField, at: FloatArray
+    hand: Hand,
+    frames: FloatArray,
+    field: DistanceField,
+    solid: DistanceField,
+    at: FloatArray,
+    reach: float | None = None,
 ) -> BoolArray:
     """(N, D) which digits reach into a hollow near a place: bones in what is filled of the object (`filled`) and is
-    not it, as a finger through a handle is. frames: (N, B, 4, 4) of bones in the object's space; at: (3,)."""
+    not it, as a finger through a handle is. frames: (N, B, 4, 4) of bones in the object's space; at: (3,). reach:
+    from the place to the bone, `LOOP_REACH` of the hand by default."""
     ends = np.einsum("nbij,bej->nbei", frames[:, :, :3, :3], hand.capsules) + frames[:, :, None, :3, 3]
     points = np.stack([ends[:, :, 0], ends.mean(axis=2), ends[:, :, 1]], axis=2)  # (N, B, 3, 3)
     flat = points.reshape(-1, 3)
-    near = np.linalg.norm(flat - at, axis=1) < LOOP_REACH * hand.length
+    near = np.linalg.norm(flat - at, axis=1) < (LOOP_REACH * hand.length if reach is None else reach)
     inside = near.copy()
     inside[near] = (field.distances(flat[near]) > 0.0) & (solid.distances(flat[near]) < 0.0)
     by_bone = inside.reshape(points.shape[:3]).any(axis=2) & hand.flexes

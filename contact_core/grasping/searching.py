@@ -23,6 +23,7 @@ from contact_core.progress import NO_PROGRESS, Progress
 SECOND_LOOK = 220  # approaches that are closed with all starts of the thumb
 MORE = {"power": 3.0}  # times as many approaches of a kind as of others
 TURNS = ("power", "power", "precision", "power", "pinch", "power", "hook")  # one after the other
+BOTH = 0.8  # what it is worth that the thumb is through one, too
 THREADED = 0.3  # what each finger through a loop at the place to hold is worth to a first look
 WORSE, HOPELESS = 1.1, -0.6  # a first look that is worse than the best by so much, and below that, is not tried
 USUAL: tuple[Kind, ...] = ("power", "precision", "pinch", "hook")
@@ -99,7 +100,9 @@ def _threaded(scene: GraspScene, closed: Closed) -> FloatArray:
         return np.zeros(len(closed.placed))
     frames = scene.hand.frames(closed.placed, closed.angles, closed.turns)
     through = through_loops(scene.hand, frames, scene.field, scene.solid, scene.at)
-    return np.asarray(THREADED * np.minimum(through.sum(axis=1), 4))
+    thumb = scene.hand.thumb
+    both = through[:, thumb] & (through.sum(axis=1) > 1) if thumb >= 0 else np.zeros(len(through), bool)
+    return np.asarray(THREADED * np.minimum(through.sum(axis=1), 4) + BOTH * both)
 
 
 def _closed(hand: Hand, field: DistanceField, approaches: Approaches) -> Closed:

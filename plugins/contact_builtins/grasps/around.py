@@ -8,6 +8,8 @@ hook: the same with the thumb at rest and the bar below the fingers' first bones
 precision, pinch: the line between thumb and finger pads, as this hand brings them to face each other at the
 thickness, laid on two opposite places, turned about itself.
 lateral: the same with the side of the bent index finger.
+
+Near two loops that are to be held, thumb and fingers go through both (`loops`).
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from contact_builtins.grasps.loops import through_two
 from contact_builtins.grasps.opposition import SIDEWAYS, Opposition, oppositions
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.grasping.features import Features, features_of
@@ -62,6 +65,8 @@ class Around(HasSettings):
                 free = joined[_palm_is_free(request, joined)]
                 share = SHARES.get(kind, 1.0) / sum(SHARES.get(each, 1.0) for each in wanted)
                 parts.append(_thinned(free, int(share * self.most), request.seed))
+        if "precision" in wanted and (threaded := through_two(request)) is not None:
+            parts.append(threaded)
         return Approaches.joined(parts) if parts else _none(hand)
 
 

@@ -74,7 +74,7 @@ def _fingers(hand: Hand, kind: Kind) -> tuple[int, ...]:
     return tuple(others[: {"pinch": 1, "lateral": 1, "precision": 3}.get(kind, 3)])
 
 
-def _frame(hand: Hand, digit: int, start: int, share: float, last: int) -> FloatArray:
+def frame_of(hand: Hand, digit: int, start: int, share: float, last: int) -> FloatArray:
     """(3, 4) of a bone of a digit bent by a share of its room, in rig space."""
     frame = np.eye(4)
     for b in range(hand.bones[digit], last + 1):
@@ -94,7 +94,7 @@ def _pad(hand: Hand, digit: int, start: int, share: float) -> tuple[FloatArray, 
     own = [b for b in range(hand.bones[digit], hand.bones[digit + 1]) if hand.has_pad[b]]
     if not own:
         return None
-    frame = _frame(hand, digit, start, share, own[-1])
+    frame = frame_of(hand, digit, start, share, own[-1])
     return frame @ np.append(hand.pads[own[-1]], 1.0), frame[:, :3] @ hand.pad_normals[own[-1]]
 
 
@@ -104,7 +104,7 @@ def _side(hand: Hand, digit: int, share: float) -> tuple[FloatArray, FloatArray]
     if len(flexing) < 2:
         return None
     b = flexing[-2]
-    frame = _frame(hand, digit, 0, share, b)
+    frame = frame_of(hand, digit, 0, share, b)
     out = hand.thumbwards
     middle = frame @ np.append(hand.capsules[b].mean(axis=0), 1.0)
     return middle + hand.radii[b] * out, out
