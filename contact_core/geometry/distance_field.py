@@ -40,6 +40,8 @@ class DistanceField:
     def __post_init__(self) -> None:
         object.__setattr__(self, "origin", frozen(self.origin, np.float64, (3,), "origin"))
         object.__setattr__(self, "values", frozen(self.values, np.float64, (None, None, None), "values"))
+        if min(self.values.shape) < 2:
+            raise InvalidInput(f"a distance field needs 2 nodes along each axis, but got {self.values.shape}.")
 
     @classmethod
     def of(cls, mesh: TriangleMesh, *, resolution: int = 64, margin: float = 0.15) -> DistanceField:

@@ -30,9 +30,10 @@ def sample(
         cx = min(max(gx, 0.0), values.shape[0] - 1.0)
         cy = min(max(gy, 0.0), values.shape[1] - 1.0)
         cz = min(max(gz, 0.0), values.shape[2] - 1.0)
-        x = min(np.int64(cx), values.shape[0] - 2)
-        y = min(np.int64(cy), values.shape[1] - 2)
-        z = min(np.int64(cz), values.shape[2] - 2)
+        # what is no number has no cell either, and memory outside of the grid is not read
+        x = max(min(np.int64(cx), values.shape[0] - 2), 0)
+        y = max(min(np.int64(cy), values.shape[1] - 2), 0)
+        z = max(min(np.int64(cz), values.shape[2] - 2), 0)
         u, v, w = cx - x, cy - y, cz - z
         bx, by, bz = (gx - cx) * spacing, (gy - cy) * spacing, (gz - cz) * spacing
         away = np.sqrt(bx * bx + by * by + bz * bz)

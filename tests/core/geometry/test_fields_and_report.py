@@ -148,3 +148,12 @@ def test_report_names_what_is_broken() -> None:
     assert poor.degenerate_faces == (0,) and poor.duplicate_faces == (2,) and poor.unused_vertices == 4
     empty = report(TriangleMesh(np.zeros((2, 3)), np.zeros((0, 3), int)))
     assert empty.components == 0 and empty.genus is None
+
+
+def test_a_field_reads_nothing_outside_of_its_grid() -> None:
+    field = DistanceField(np.zeros(3), 1.0, np.arange(27.0).reshape(3, 3, 3))
+    odd = np.array([[np.nan, 0.5, 0.5], [np.inf, 0.5, 0.5], [-np.inf, np.nan, 1e300], [1.0, 1.0, 1.0]])
+    assert field.distances(odd)[3] == field.sample(odd)[0][3] == 13.0
+    assert not np.isfinite(field.distances(odd)[:3]).any()
+    with pytest.raises(InvalidInput, match="2 nodes along each axis"):
+        DistanceField(np.zeros(3), 1.0, np.zeros((1, 3, 3)))
