@@ -114,7 +114,7 @@ class Chart:
 
     def _lay_out_turns(self) -> None:
         """What kernels take of each joint (see chart_kernels)."""
-        kinds = {"hinge": 1, "ball": 1, "euler": 2}
+        kinds = {"hinge": 1, "ball": 1, "euler": 2}  # its VECTOR and EULER, without importing numba here
         freedoms = self.rig.freedoms
         euler = [axis_numbers(f.order) if f.kind == "euler" else (0, 0, 0) for f in freedoms]
         self._turning = (

@@ -11,7 +11,7 @@ import numpy as np
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.jit import constant, kernel
 
-STILL, VECTOR, EULER = constant(0), constant(1), constant(2)
+VECTOR, EULER = constant(1), constant(2)  # kinds, as Chart lays them out; 0 does not turn
 
 
 @kernel
