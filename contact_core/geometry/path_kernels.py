@@ -63,7 +63,7 @@ def bend_met(
     """The last vertex that bends paths on the last leg of a path, walked back from its end along the unit vector
     (bx, by): (vertex or -1, corner, leg from the vertex to the end in the corner's frame)."""
     status, corner, miss, _, cos, sin, before, _ = walk(
-        on, element, x, y, length * bx, length * by, False, True, 0, mesh, line
+        on, element, x, y, bx, by, length, False, True, 0, mesh, line
     )
     if status != MET_BEND:
         return -1, 0, 0.0, 0.0

@@ -170,7 +170,7 @@ def heading_at(on: int, element: int, h: int, x: float, y: float, mesh: Halfedge
     In the tangent frame of the place where it ends. At a vertex the direction backwards is what lies in the face,
     and forwards is opposite to it in the rescaled frame.
     """
-    length = math.hypot(x, y)
+    length = norm(x, y)
     x, y = x / length, y / length
     cos, sin = direction_in_face(h, mesh)
     fx, fy = turned(x, y, cos, sin)  # in the frame of the face

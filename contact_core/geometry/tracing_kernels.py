@@ -46,6 +46,7 @@ TOO_LONG = constant(3)  # more than MOST_CROSSINGS: a length that no one meant
 NO_ROOM = constant(4)  # the polyline buffer is full
 MET_BEND = constant(5)  # a walk that was to stop there met a vertex that bends paths
 MOST_CROSSINGS = constant(5_000_000)
+CURVE_CELLS = 63.99  # cells along an axis of the curve of `keys_along_curve`, the last of which holds the rim
 MEETING = 4.0 * SNAP  # the wider sense in which a walk meets vertices that it is to stop at
 GRAZE = 1e-10  # radians by which a direction may point out of a boundary and still run along it
 # Legs of a chain join at vertices. A leg that ends this near to one, as a part of an edge, ends there: vertices on
@@ -122,15 +123,16 @@ def walk(
     element: int,
     x: float,
     y: float,
-    zx: float,
-    zy: float,
+    dx: float,
+    dy: float,
+    remaining: float,
     to_joint: bool,
     to_bend: bool,
     line_end: int,
     mesh: Halfedges,
     line: Points,
 ) -> tuple[int, int, float, float, float, float, float, int]:
-    """Walk straight from a place along the tangent vector (zx, zy), not zero.
+    """Walk straight from a place along the unit vector (dx, dy) for the length `remaining`, not 0.
 
     Crossings are appended to the line buffers from row line_end on, if these have rows. Returns (status; the
     halfedge in whose frame the walk ends, or the blocked element, or -1 if it could not leave its start; x, y;
@@ -140,8 +142,6 @@ def walk(
     one more. Returns MET_BEND, the corner there, how far to the left the vertex lay, 0, and the direction back in
     the frame of the corner.
     """
-    remaining = math.hypot(zx, zy)
-    dx, dy = zx / remaining, zy / remaining
     h, vertex, angle, miss = -1, -1, 0.0, 0.0
     if on == ON_FACE:
         h, x, y, dx, dy = start_in_face(element, x, y, dx, dy, mesh)
@@ -181,14 +181,12 @@ def walk(
             ux, uy = ax / size, ay / size
         near = MEETING * size if to_bend else SNAP * size
         across = dx * uy - dy * ux
-        if across == 0.0:  # along a face without area
+        if abs(across) < 1e-300:  # along a face without area
             step, along = max((length - x) if dx > 0.0 else x, 0.0), 0.0
         else:
             inverse = 1.0 / across
             step = max(((ox - x) * uy + y * ux) * inverse, 0.0)
-            along = min(
-                max(((ox - x) * dy + y * dx) * inverse, 0.0), size
-            )  # from the mesh.tail or head to the apex
+            along = ((ox - x) * dy + y * dx) * inverse  # from the tail or head to the apex; rounding: to a vertex
         at_vertex, arrival = along <= near or size - along <= near, near
         if at_vertex:  # the step to the vertex, not to where the ray leaves beside it
             along = 0.0 if along <= near else size
@@ -310,6 +308,37 @@ def settle(
     return on, element, px, py
 
 
+@inlined
+def spread(cell: int) -> int:
+    """The six bits of a number, two zeros between each and the next."""
+    cell = (cell | cell << 8) & 0x300F
+    cell = (cell | cell << 4) & 0x30C3
+    return (cell | cell << 2) & 0x9249
+
+
+@kernel
+def keys_along_curve(points: FloatArray, faces: IntArray, chosen: IntArray, keys: IntArray) -> None:
+    """Write the place of each chosen face (k,) along a Z-order curve through their bounding cube as keys (k,).
+
+    A face is where its first corner is. Morton 1966: neighbours along the curve are neighbours in space.
+    """
+    first = points[faces[chosen[0], 0]]
+    low_x, low_y, low_z, size = first[0], first[1], first[2], 0.0
+    for f in chosen:
+        v = faces[f, 0]
+        low_x, low_y, low_z = min(low_x, points[v, 0]), min(low_y, points[v, 1]), min(low_z, points[v, 2])
+    for f in chosen:
+        v = faces[f, 0]
+        size = max(size, points[v, 0] - low_x, points[v, 1] - low_y, points[v, 2] - low_z)
+    scale = CURVE_CELLS / size if size > 0.0 else 0.0
+    for i in range(len(chosen)):
+        v = faces[chosen[i], 0]
+        x = spread(int((points[v, 0] - low_x) * scale))
+        y = spread(int((points[v, 1] - low_y) * scale))
+        z = spread(int((points[v, 2] - low_z) * scale))
+        keys[i] = x | y << 1 | z << 2
+
+
 @kernel
 def trace(
     starts: Points,
@@ -353,7 +382,7 @@ def trace(
         while True:
             if rest >= 1e-290:
                 status, h, x, y, dx, dy, rest, cursor = walk(
-                    on, element, x, y, hx * rest, hy * rest, leg < offsets[i + 1], False, cursor, mesh, line
+                    on, element, x, y, hx, hy, rest, leg < offsets[i + 1], False, cursor, mesh, line
                 )
                 if status != DONE:
                     return status, i, h
