@@ -9,7 +9,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, Int32Array, IntArray, SingleArray
 from contact_core.geometry.box_tree import Dipoles, Tree, corners_of, run_of
-from contact_core.geometry.jit import kernel
+from contact_core.geometry.jit import inner, kernel
 
 STACK = 128  # the tree is balanced: its depth is log2 of the leaf count, and a stack holds one sibling a level
 
@@ -54,13 +54,13 @@ def _blank(k: int) -> tuple[IntArray, FloatArray, FloatArray]:
     return np.full(k, -1, np.int64), np.tile([1.0, 0.0, 0.0], (k, 1)), np.full(k, np.inf)
 
 
-@kernel
+@inner
 def _in_frame(frame: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A point in the frame that boxes are in."""
     return (x - frame[0]) * frame[3], (y - frame[1]) * frame[3], (z - frame[2]) * frame[3]
 
 
-@kernel
+@inner
 def _box_entry(
     boxes: SingleArray, node: int, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
 ) -> float:
@@ -173,7 +173,7 @@ def _cast(
             distances[i] = best
 
 
-@kernel
+@inner
 def _box_distance(boxes: SingleArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance of a point to a node's box."""
     dx = max(boxes[node, 0] - x, x - boxes[node, 3], 0.0)
@@ -182,7 +182,7 @@ def _box_distance(boxes: SingleArray, node: int, x: float, y: float, z: float) -
     return dx * dx + dy * dy + dz * dz
 
 
-@kernel
+@inner
 def _closest_on_triangle(
     a: FloatArray, b: FloatArray, c: FloatArray, x: float, y: float, z: float, out: FloatArray
 ) -> float:
@@ -289,7 +289,7 @@ def _closest(
                 distance[i] = np.sqrt(squared)
 
 
-@kernel
+@inner
 def _looks_away(a: FloatArray, b: FloatArray, c: FloatArray, x: float, y: float, z: float, limit: float) -> bool:
     """Whether the normal of triangle abc (0: no area) and a unit vector (x, y, z) have a cosine above a limit."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -299,7 +299,7 @@ def _looks_away(a: FloatArray, b: FloatArray, c: FloatArray, x: float, y: float,
     return nx * x + ny * y + nz * z > limit * length if length > 0.0 else limit < 0.0
 
 
-@kernel
+@inner
 def _solid_angle(p: FloatArray, q: FloatArray, r: FloatArray, x: float, y: float, z: float) -> float:
     """Signed solid angle of triangle pqr seen from (x, y, z) (van Oosterom and Strackee 1983)."""
     ax, ay, az = p[0] - x, p[1] - y, p[2] - z

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import kernel
+from contact_core.geometry.jit import inner, kernel
 from contact_core.geometry.kernel_arrays import Halfedges, Points
 from contact_core.geometry.tangent_kernels import (
     ON_EDGE,
@@ -22,7 +22,7 @@ from contact_core.geometry.tangent_kernels import (
 from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, preceding
 
 
-@kernel
+@inner
 def in_frame(
     h: int, dx: float, dy: float, dz: float, points: FloatArray, faces: IntArray
 ) -> tuple[float, float, float]:
@@ -44,7 +44,7 @@ def in_frame(
     return x, dx * wx + dy * wy + dz * wz, normal
 
 
-@kernel
+@inner
 def in_space(h: int, x: float, y: float, points: FloatArray, faces: IntArray, direction: FloatArray) -> None:
     """Write the unit direction in space (3,) of direction (x, y) in the frame of halfedge h."""
     f, k = h // 3, h % 3

@@ -88,6 +88,17 @@ class Points(NamedTuple):
     barycentric: FloatArray
 
 
+class Grid(NamedTuple):
+    """A distance field (`distance_field.DistanceField`), in surface units.
+
+    values: (nx, ny, nz) at nodes that lie `spacing` apart, the first at origin (3,).
+    """
+
+    values: FloatArray
+    origin: FloatArray
+    spacing: float
+
+
 class Goal(NamedTuple):
     """The place that a search is for, where it is for one alone.
 

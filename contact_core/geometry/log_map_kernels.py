@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.jit import constant, inlined, inner, kernel
 from contact_core.geometry.kernel_arrays import Goal, Halfedges, Labels, Path, Points, Queue, Targets, Windows
 from contact_core.geometry.queue_kernels import (
     FREE,
@@ -71,7 +71,7 @@ GRAZING_RANK = 1.0 + 1e-11
 CHECK_EVERY = constant(64)  # pops, at least, between two looks at the targets
 
 
-@kernel
+@inner
 def list_targets(ends: Points, mesh: Halfedges, labels: Labels, targets: Targets) -> int:
     """Find the places of targets and enter those inside faces and on edges in the list of a face.
 
@@ -141,7 +141,7 @@ def update_targets(w: int, mesh: Halfedges, labels: Labels, windows: Windows, ta
         t = targets.integers[t, NEXT]
 
 
-@kernel
+@inner
 def farthest_target(limit: float, mesh: Halfedges, labels: Labels, targets: Targets) -> float:
     """The largest distance that some target still needs searching: no more than `limit`."""
     bound = 0.0
@@ -160,14 +160,14 @@ def farthest_target(limit: float, mesh: Halfedges, labels: Labels, targets: Targ
     return bound
 
 
-@kernel
+@inner
 def host_face(t: int, targets: Targets) -> int:
     """The face in whose list target t waits."""
     element = targets.integers[t, ELEMENT]
     return element if targets.integers[t, ON] == ON_FACE else element // 3
 
 
-@kernel
+@inner
 def update_targets_beside(base: int, x: float, y: float, root: int, labels: Labels, targets: Targets) -> None:
     """Update the targets of the face of `base` with the straight legs from the source at (x, y) in its frame."""
     f, k = base // 3, base % 3
@@ -180,7 +180,7 @@ def update_targets_beside(base: int, x: float, y: float, root: int, labels: Labe
         t = targets.integers[t, NEXT]
 
 
-@kernel
+@inner
 def seed(
     s: int,
     sources: Points,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import kernel
+from contact_core.geometry.jit import inner, kernel
 from contact_core.geometry.kernel_arrays import Halfedges, Labels, Path, Points, Targets
 from contact_core.geometry.log_map_kernels import (
     ARRIVAL,
@@ -46,7 +46,7 @@ from contact_core.geometry.window_kernels import INSIDE, distance_at
 AS_LONG = 1.0 + 1e-9  # relative: a leg that is bent where it meets a vertex gets longer by the square of the miss
 
 
-@kernel
+@inner
 def bend_met(
     on: int,
     element: int,
@@ -74,7 +74,7 @@ def bend_met(
     return v, corner, after * cos - miss * sin, after * sin + miss * cos
 
 
-@kernel
+@inner
 def bend_path_to_vertex(v: int, mesh: Halfedges, labels: Labels, line: Points) -> None:
     """Bend the last leg of the path to v at the vertex that it passes, if it may pass one."""
     if labels.origin[v, 3] == 0:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from contact_core.geometry.elements import EXCESS
-from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.jit import constant, inlined, inner
 from contact_core.geometry.kernel_arrays import Halfedges, Points
 from contact_core.geometry.topology_kernels import (
     BLOCKED_VERTEX,
@@ -119,7 +119,7 @@ def corner_angle(h: int, mesh: Halfedges) -> float:
     return math.atan2(mesh.shape[h, 2], mesh.shape[h, 1])
 
 
-@kernel
+@inner
 def angle_round_vertex(h: int, x: float, y: float, mesh: Halfedges) -> float:
     """The angle at the tail of h, from its first halfedge, of direction (x, y) in the frame of h; not rescaled.
 
@@ -152,7 +152,7 @@ def corner_of(f: int, v: int, mesh: Halfedges) -> int:
     return 3 * f + 1 if mesh.tail[3 * f + 1] == v else 3 * f + 2
 
 
-@kernel
+@inner
 def corner_at_angle(v: int, angle: float, mesh: Halfedges) -> tuple[int, float]:
     """The corner (by its halfedge) of v that holds an angle round it, and the angle within that corner."""
     h = mesh.first[v]

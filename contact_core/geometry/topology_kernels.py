@@ -7,7 +7,7 @@ import math
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry import elements
 from contact_core.geometry.flat_faces import FLAT
-from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.jit import constant, inlined, inner, kernel
 
 BOUNDARY = constant(elements.BOUNDARY)
 BLOCKED = constant(elements.BLOCKED)
@@ -73,7 +73,7 @@ def merge_lengthless_edges(faces: IntArray, shape: FloatArray, parent: IntArray,
         tail[h] = v
 
 
-@kernel
+@inner
 def _home(tail: IntArray, degree: IntArray, h: int) -> int:
     """The bucket of a halfedge's edge: the end with fewer halfedges (no bucket grows long), ties by index."""
     a, b = tail[h], tail[following(h)]
@@ -82,7 +82,7 @@ def _home(tail: IntArray, degree: IntArray, h: int) -> int:
     return min(a, b)
 
 
-@kernel
+@inner
 def has_three_corners(tail: IntArray, f: int) -> bool:
     """Whether face f is a triangle, and not a segment or a point."""
     a, b, c = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
@@ -119,7 +119,7 @@ def pair_halfedges(tail: IntArray, degree: IntArray, head: IntArray, link: IntAr
             other = link[other]
 
 
-@kernel
+@inner
 def _block(twin: IntArray, h: int) -> None:
     """Block a halfedge and whatever it was joined to."""
     other = twin[h]

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 
-from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.jit import constant, inlined, inner
 from contact_core.geometry.kernel_arrays import Goal, Halfedges, Labels, Path, Queue, Window, Windows
 from contact_core.geometry.queue_kernels import FREE, OVERFLOW, USED, WINDOWS, heap_push, stack_push
 from contact_core.geometry.tangent_kernels import (
@@ -105,7 +105,7 @@ def window_key(
     return norm(p - sx, sy) + norm(p - tx, ty)
 
 
-@kernel
+@inner
 def update_vertex(
     v: int, path: Path, bound: float, mesh: Halfedges, labels: Labels, queue: Queue, goal: Goal
 ) -> None:
@@ -310,7 +310,7 @@ def is_displaced(w: int, mesh: Halfedges, labels: Labels, windows: Windows) -> b
     return gap > GRAZING if side == LEFT_CHILD else gap < -GRAZING
 
 
-@kernel
+@inner
 def windows_of_pseudo_source(
     v: int, bound: float, mesh: Halfedges, labels: Labels, windows: Windows, queue: Queue, goal: Goal
 ) -> None:
@@ -350,7 +350,7 @@ def windows_of_pseudo_source(
             break
 
 
-@kernel
+@inner
 def window_from_corner(
     h: int,
     a0: float,
@@ -384,7 +384,7 @@ def window_from_corner(
     push_window(opposite, window, bound, mesh, labels, windows, queue, goal)
 
 
-@kernel
+@inner
 def windows_of_source(
     base: int,
     x: float,

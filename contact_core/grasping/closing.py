@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.distance_field import DistanceField
+from contact_core.geometry.kernel_arrays import Grid
 from contact_core.grasping.hand import Hand
 
 TOUCH = 0.004  # of the hand's length: nearer than this is touching
@@ -59,32 +61,52 @@ def close_hands(
     radius of the round bar on which fingers close in place of the whole object, radius 0 for the object.
     curls: (N,) how far digits are bent before they close, of their limits. limits: (N, D) how far at most.
     """
-    from contact_core.grasping.closing_kernels import close_all
+    from contact_core.grasping import closing_kernels as kernels
 
     n, bones, digits = len(placed), len(hand.joints), len(hand.bones) - 1
-    frames = np.ascontiguousarray(placed[:, :3, :], np.float64)
-    bars = np.zeros((n, 7)) if bars is None else np.ascontiguousarray(bars, np.float64)
-    curls = np.zeros(n) if curls is None else np.ascontiguousarray(curls, np.float64)
-    limits = np.ones((n, digits)) if limits is None else np.ascontiguousarray(limits, np.float64)
-    angles, turns = np.zeros((n, bones)), np.tile(np.eye(3), (n, digits, 1, 1))
-    fits, clear = np.zeros((n, bones, 8)), np.zeros((n, digits))
-    rest, palm, travel = np.zeros(n), np.zeros(n), np.zeros(n)
-    close_all(
-        frames, np.ascontiguousarray(ways, np.float64), bars, curls, limits, hand.bones, hand.links, hand.axes,
-        hand.low, hand.high, hand.flexes, hand.thumb, hand.starts, hand.start_counts, hand.start_angles,
-        hand.start_prices, hand.probes, hand.probe_bones, hand.probe_starts, hand.levers, hand.tested,
-        hand.tested_bones, hand.rest, hand.pads, hand.pad_normals, hand.has_pad, hand.capsules, hand.radii,
-        hand.room, field.values, field.origin, float(field.spacing), TOUCH * hand.length, ON, float(hand.length),
-        float(oppose), float(along), hand.looks, hand.look_frame, hand.look_low, hand.look_high, angles,
-        turns, fits, clear, rest, palm, travel, np.zeros((bones, 3, 3)), np.zeros(bones),
-        np.zeros((bones, 3, 4)), np.zeros((bones, 2, 3)), np.zeros(digits, bool), np.zeros(bones, bool),
-        np.zeros(bones, bool), np.zeros(bones), np.zeros(8), np.zeros(3), np.zeros(7), hand.firsts,
-        np.zeros(bones), hand.leads, hand.ratios, np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.eye(3),
+    begins = kernels.Placed(
+        np.ascontiguousarray(placed[:, :3, :], np.float64),
+        np.ascontiguousarray(ways, np.float64),
+        np.zeros((n, 7)) if bars is None else np.ascontiguousarray(bars, np.float64),
+        np.zeros(n) if curls is None else np.ascontiguousarray(curls, np.float64),
+        np.ones((n, digits)) if limits is None else np.ascontiguousarray(limits, np.float64),
+    )
+    found = kernels.Found(
+        np.zeros((n, bones)), np.tile(np.eye(3), (n, digits, 1, 1)), np.zeros((n, bones, 8)), np.zeros((n, digits)),
+        np.zeros(n), np.zeros(n), np.zeros(n),
     )  # fmt: skip
-    angles = hand.coupled(angles)
+    kernels.close_all(
+        begins, *_groups(hand), Grid(field.values, field.origin, float(field.spacing)),
+        kernels.Rules(float(hand.length), TOUCH * hand.length, ON, float(oppose), float(along)),
+        *_working_memory(bones, digits), found,
+    )  # fmt: skip
     whole = np.tile(np.eye(4), (n, 1, 1))
-    whole[:, :3, :] = frames
-    return Closed(whole, angles, turns, fits, clear, rest, palm, travel)
+    whole[:, :3, :] = begins.frames
+    return Closed(whole, hand.coupled(found.angles), *found[1:])
+
+
+def _groups(hand: Hand) -> tuple[Any, Any, Any]:
+    """The hand as kernels take it."""
+    from contact_core.grasping.closing_kernels import Chains, Skin, Starts
+
+    starts = Starts(
+        hand.starts, hand.start_counts, hand.start_angles, hand.start_prices, hand.looks, hand.look_frame,
+        hand.look_low, hand.look_high,
+    )  # fmt: skip
+    chains, skin = ((getattr(hand, name) for name in group._fields) for group in (Chains, Skin))
+    return Chains(*chains), Skin(*skin), starts
+
+
+def _working_memory(bones: int, digits: int) -> tuple[Any, Any]:
+    from contact_core.grasping.closing_kernels import Best, State
+
+    state = State(
+        turns=np.zeros((bones, 3, 3)), angles=np.zeros(bones), frames=np.zeros((bones, 3, 4)),
+        ends=np.zeros((bones, 2, 3)), ceiling=np.zeros(bones), moves=np.zeros(bones, bool),
+        going=np.zeros(bones, bool), done=np.zeros(digits, bool), mean=np.zeros(3), normals=np.zeros((3, 3)),
+        fit=np.zeros(8), whole=np.zeros(7),
+    )  # fmt: skip
+    return state, Best(np.zeros(bones), np.eye(3), np.zeros(3), np.zeros(3))
 
 
 def relaxed(hand: Hand, closed: Closed) -> Closed:

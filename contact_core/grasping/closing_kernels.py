@@ -1,48 +1,163 @@
 """Kernels that bring a hand to an object and curl its digits until they touch (GraspIt!'s rule, Miller and Allen
 2004), one digit's links at a few dozen points, with steps that the clearance allows (sphere tracing, Hart 1996).
 
-Flat arrays: see `closing.Hand`. A frame is (3, 4), the upper rows of a rigid matrix. Nothing is allocated.
+A frame is (3, 4), the upper rows of a rigid matrix. Nothing is allocated. Digits are numbered d, bones b.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray, IntArray
-from contact_core.geometry.jit import constant, inlined, kernel
+from contact_core.geometry.field_kernels import distance_and_gradient
+from contact_core.geometry.jit import constant, inlined, inner, kernel
+from contact_core.geometry.kernel_arrays import Grid
 
 LEAST_STEP, LARGEST_STEP = np.radians(1.0), np.radians(15.0)
 LAST_RATIO = 0.7  # the last joint of a digit curls more slowly, as tendons make it
 OUT_OF_BAR = 0.02  # hand lengths: a digit that is deeper in the object than this does not fit beside a bar
 TURNED = 0.04  # hand lengths that a pad is worth that looks away from the object
+BEST = 1e-12  # hand lengths by which a start has to be better than the best before it
 ROUNDS = constant(120)
 ZERO, ONE = constant(0), constant(1)
 
 
-@inlined
-def field_at(values: FloatArray, origin: FloatArray, spacing: float, x: float, y: float, z: float) -> float:
-    """Trilinear signed distance, as `DistanceField.distances`."""
-    nx, ny, nz = values.shape
-    gx, gy, gz = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
-    cx, cy, cz = min(max(gx, 0.0), nx - 1.0), min(max(gy, 0.0), ny - 1.0), min(max(gz, 0.0), nz - 1.0)
-    i, j, k = min(np.int64(cx), nx - 2), min(np.int64(cy), ny - 2), min(np.int64(cz), nz - 2)
-    fx, fy, fz = cx - i, cy - j, cz - k
-    a = values[i, j, k] + fx * (values[i + 1, j, k] - values[i, j, k])
-    b = values[i, j + 1, k] + fx * (values[i + 1, j + 1, k] - values[i, j + 1, k])
-    c = values[i, j, k + 1] + fx * (values[i + 1, j, k + 1] - values[i, j, k + 1])
-    d = values[i, j + 1, k + 1] + fx * (values[i + 1, j + 1, k + 1] - values[i, j + 1, k + 1])
-    low, high = a + fy * (b - a), c + fy * (d - c)
-    away = np.sqrt((gx - cx) ** 2 + (gy - cy) ** 2 + (gz - cz) ** 2) * spacing
-    return low + fz * (high - low) + away
+class Chains(NamedTuple):
+    """The digits of a hand as chains of bones, thumb first where there is one: fields of `hand.Hand`.
+
+    thumb: which digit it is, -1 for none.
+    """
+
+    bones: IntArray
+    firsts: IntArray
+    links: FloatArray
+    axes: FloatArray
+    low: FloatArray
+    high: FloatArray
+    flexes: BoolArray
+    leads: IntArray
+    ratios: FloatArray
+    thumb: int
+
+
+class Skin(NamedTuple):
+    """Points, pads and capsules of a hand's skin: fields of `hand.Hand`."""
+
+    probes: FloatArray
+    probe_bones: IntArray
+    probe_starts: IntArray
+    levers: FloatArray
+    tested: FloatArray
+    tested_bones: IntArray
+    rest: FloatArray
+    pads: FloatArray
+    pad_normals: FloatArray
+    has_pad: BoolArray
+    capsules: FloatArray
+    radii: FloatArray
+    room: FloatArray
+
+
+class Starts(NamedTuple):
+    """From where each digit is closed, and where to look about the best of a thumb's: fields of `hand.Hand`.
+
+    turns: (D, S, 3, 3), counts: (D,), angles, prices: (D, S). ways: (4,) starts each way, and rounds of looking.
+    frame: (3, 3), low, high: (3,).
+    """
+
+    turns: FloatArray
+    counts: IntArray
+    angles: FloatArray
+    prices: FloatArray
+    ways: IntArray
+    frame: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+class Rules(NamedTuple):
+    """length: of the hand, surface units; touch: nearer than so many of them is touching. In hand lengths: on, how
+    near a pad presses; oppose, along: what it is worth that a thumb opposes, and lies across a rod."""
+
+    length: float
+    touch: float
+    on: float
+    oppose: float
+    along: float
+
+
+class Placed(NamedTuple):
+    """Where N hands begin, and what is asked of each.
+
+    frames: (N, 3, 4) object_from_rig, moved by the approach. ways: (N, 3). bars: (N, 7). curls: (N,). limits:
+    (N, D). See `closing.close_hands`.
+    """
+
+    frames: FloatArray
+    ways: FloatArray
+    bars: FloatArray
+    curls: FloatArray
+    limits: FloatArray
+
+
+class Found(NamedTuple):
+    """How N hands closed: arrays of `closing.Closed`."""
+
+    angles: FloatArray
+    turns: FloatArray
+    fits: FloatArray
+    clear: FloatArray
+    rest: FloatArray
+    palm: FloatArray
+    travel: FloatArray
+
+
+class State(NamedTuple):
+    """One hand as it closes.
+
+    turns: (B, 3, 3) of each bone before it bends. angles: (B,). frames: (B, 3, 4) and capsules' ends (B, 2, 3) in
+    the object's space. ceiling: (B,) how far each bends at most. moves, going: (B,) which bend, and still do.
+    done: (D,) which digits are closed. mean: (3,) the object's normal under the fingers, normals: (3, 3) the mean
+    of n n^T. fit: (8,) of a pad. whole: (7,) a bar of radius 0, for all of the object.
+    """
+
+    turns: FloatArray
+    angles: FloatArray
+    frames: FloatArray
+    ends: FloatArray
+    ceiling: FloatArray
+    moves: BoolArray
+    going: BoolArray
+    done: BoolArray
+    mean: FloatArray
+    normals: FloatArray
+    fit: FloatArray
+    whole: FloatArray
+
+
+class Best(NamedTuple):
+    """The best start so far of a digit. angles: (B,). turn: (3, 3). at: (3,) twist, spread and flexion of a thumb;
+    trial: (3,) those that are tried next."""
+
+    angles: FloatArray
+    turn: FloatArray
+    at: FloatArray
+    trial: FloatArray
 
 
 @inlined
-def distance_at(
-    values: FloatArray, origin: FloatArray, spacing: float, bar: FloatArray, x: float, y: float, z: float,
-) -> float:  # fmt: skip
+def distance_at(grid: Grid, x: float, y: float, z: float) -> float:
+    """Signed distance of a point to the object."""
+    return distance_and_gradient(grid, x, y, z)[0]
+
+
+@inlined
+def distance_beside(grid: Grid, bar: FloatArray, x: float, y: float, z: float) -> float:
     """Signed distance to the object; where bar[6] > 0 to a round bar alone: middle (3), axis (3), radius."""
     if bar[6] <= 0.0:
-        return field_at(values, origin, spacing, x, y, z)
+        return distance_at(grid, x, y, z)
     px, py, pz = x - bar[0], y - bar[1], z - bar[2]
     along = px * bar[3] + py * bar[4] + pz * bar[5]
     px, py, pz = px - along * bar[3], py - along * bar[4], pz - along * bar[5]
@@ -51,8 +166,13 @@ def distance_at(
 
 @inlined
 def bent(
-    out: FloatArray, base: FloatArray, link: FloatArray, pre: FloatArray, axis: FloatArray, angle: float,
-) -> None:  # fmt: skip
+    out: FloatArray,
+    base: FloatArray,
+    link: FloatArray,
+    pre: FloatArray,
+    axis: FloatArray,
+    angle: float,
+) -> None:
     """out = base @ link @ pre @ turn(axis, angle); base, link, out (3, 4), pre (3, 3)."""
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = axis[0], axis[1], axis[2]
@@ -75,26 +195,33 @@ def bent(
 
 
 @inlined
-def moved(frame: FloatArray, p: FloatArray, axis: int) -> float:
-    """One coordinate of a point (3,) in a frame."""
-    return frame[axis, 0] * p[0] + frame[axis, 1] * p[1] + frame[axis, 2] * p[2] + frame[axis, 3]
+def copy_turn(source: FloatArray, target: FloatArray) -> None:
+    """target (3, 3) = source (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            target[i, j] = source[i, j]
 
 
-@kernel
-def pose_digit(
-    d: int, base: FloatArray, bones: IntArray, links: FloatArray, pres: FloatArray, axes: FloatArray, angles:
-    FloatArray, frames: FloatArray,
-) -> None:  # fmt: skip
+@inlined
+def moved(frame: FloatArray, p: FloatArray) -> tuple[float, float, float]:
+    """A point (3,) in a frame."""
+    return (
+        frame[0, 0] * p[0] + frame[0, 1] * p[1] + frame[0, 2] * p[2] + frame[0, 3],
+        frame[1, 0] * p[0] + frame[1, 1] * p[1] + frame[1, 2] * p[2] + frame[1, 3],
+        frame[2, 0] * p[0] + frame[2, 1] * p[1] + frame[2, 2] * p[2] + frame[2, 3],
+    )
+
+
+@inner
+def pose_digit(d: int, base: FloatArray, chains: Chains, state: State) -> None:
     """Frames of the bones of digit d at their angles."""
-    first = bones[d]
-    for b in range(first, bones[d + 1]):
-        if b == first:
-            bent(frames[b], base, links[b], pres[b], axes[b], angles[b])
-        else:
-            bent(frames[b], frames[b - 1], links[b], pres[b], axes[b], angles[b])
+    first = chains.bones[d]
+    for b in range(first, chains.bones[d + 1]):
+        before = base if b == first else state.frames[b - 1]
+        bent(state.frames[b], before, chains.links[b], state.turns[b], chains.axes[b], state.angles[b])
 
 
-@kernel
+@inner
 def segments_apart(p: FloatArray, q: FloatArray, r: FloatArray, s: FloatArray) -> float:
     """Distance of segments pq and rs, each end (3,). Ericson, "Real-Time Collision Detection", 5.1.9."""
     a = e = f = b = c = 0.0
@@ -116,146 +243,134 @@ def segments_apart(p: FloatArray, q: FloatArray, r: FloatArray, s: FloatArray) -
     return np.sqrt(total)
 
 
-@kernel
-def place_capsules(d: int, bones: IntArray, frames: FloatArray, capsules: FloatArray, ends: FloatArray) -> None:
-    """Ends (B, 2, 3) of the capsules of digit d in the object's space."""
-    for b in range(bones[d], bones[d + 1]):
+@inner
+def place_capsules(d: int, chains: Chains, skin: Skin, state: State) -> None:
+    """Ends of the capsules of digit d in the object's space."""
+    for b in range(chains.bones[d], chains.bones[d + 1]):
         for e in range(2):
-            for i in range(3):
-                ends[b, e, i] = moved(frames[b], capsules[b, e], i)
+            x, y, z = moved(state.frames[b], skin.capsules[b, e])
+            state.ends[b, e, 0], state.ends[b, e, 1], state.ends[b, e, 2] = x, y, z
 
 
-@kernel
-def touched_digit(
-    d: int, bones: IntArray, radii: FloatArray, room: FloatArray, ends: FloatArray, done: BoolArray,
-) -> int:  # fmt: skip
-    """The last bone of digit d whose capsule is in another placed digit's, -1 for none.
-
-    room: (B, B) how near two capsules may come; done: (D,) which digits are placed.
-    """
+@inner
+def touched_digit(d: int, chains: Chains, skin: Skin, state: State) -> int:
+    """The last bone of digit d whose capsule is in that of another digit which is closed, -1 for none."""
     last = -ONE
-    for b in range(bones[d], bones[d + 1]):
-        if radii[b] <= 0.0:
+    for b in range(chains.bones[d], chains.bones[d + 1]):
+        if skin.radii[b] <= 0.0:
             continue
-        for other in range(len(done)):
-            if not done[other] or other == d:
+        for other in range(len(state.done)):
+            if not state.done[other] or other == d:
                 continue
-            for c in range(bones[other], bones[other + 1]):
-                if radii[c] > 0.0 and room[b, c] > 0.0:
-                    gap = segments_apart(ends[b, 0], ends[b, 1], ends[c, 0], ends[c, 1])
-                    if gap < room[b, c]:
+            for c in range(chains.bones[other], chains.bones[other + 1]):
+                if skin.radii[c] > 0.0 and skin.room[b, c] > 0.0:
+                    gap = segments_apart(state.ends[b, 0], state.ends[b, 1], state.ends[c, 0], state.ends[c, 1])
+                    if gap < skin.room[b, c]:
                         last = b
     return last
 
 
-@kernel
+@inner
 def close_digit(
-    d: int, base: FloatArray, bones: IntArray, links: FloatArray, pres: FloatArray, axes: FloatArray, high:
-    FloatArray, moves: BoolArray, angles: FloatArray, frames: FloatArray, probes: FloatArray, probe_bones:
-    IntArray, probe_starts: IntArray, levers: FloatArray, values: FloatArray, origin: FloatArray, spacing:
-    float, bar: FloatArray, touch: float, capsules: FloatArray, radii: FloatArray, room: FloatArray, ends:
-    FloatArray, done: BoolArray, going: BoolArray, leads: IntArray, ratios: FloatArray,
-) -> float:  # fmt: skip
-    """Curl digit d from `angles` until each joint's link, or one beyond it, touches; returns the least clearance.
+    d: int, base: FloatArray, bar: FloatArray, chains: Chains, skin: Skin, grid: Grid, touch: float, state: State
+) -> float:
+    """Curl digit d from its angles until each joint's link, or one beyond it, touches; returns the least clearance.
 
-    leads: (B,) the bone with which each turns, `ratios` times as much, -1 for none.
+    bar: (7,) what it closes on (`distance_beside`).
     """
-    first, end = bones[d], bones[d + 1]
+    first, end = chains.bones[d], chains.bones[d + 1]
     last_moving = -ONE
     for b in range(first, end):
-        going[b] = moves[b] and leads[b] < 0
-        if going[b]:
+        state.going[b] = state.moves[b] and chains.leads[b] < 0
+        if state.going[b]:
             last_moving = b
     least = np.inf
     for _ in range(ROUNDS):
         for b in range(first, end):
-            if leads[b] >= 0:
-                angles[b] = ratios[b] * angles[leads[b]]
-        pose_digit(d, base, bones, links, pres, axes, angles, frames)
+            if chains.leads[b] >= 0:
+                state.angles[b] = chains.ratios[b] * state.angles[chains.leads[b]]
+        pose_digit(d, base, chains, state)
         least = np.inf
         stop = -ONE
         step = LARGEST_STEP
-        for p in range(probe_starts[d], probe_starts[d + 1]):
-            b = probe_bones[p]
-            clear = distance_at(
-                values, origin, spacing, bar, moved(frames[b], probes[p], 0), moved(frames[b], probes[p], 1),
-                moved(frames[b], probes[p], 2),
-            )  # fmt: skip
+        for p in range(skin.probe_starts[d], skin.probe_starts[d + 1]):
+            b = skin.probe_bones[p]
+            x, y, z = moved(state.frames[b], skin.probes[p])
+            clear = distance_beside(grid, bar, x, y, z)
             least = min(least, clear)
             if clear < touch:
                 stop = max(stop, b)
             else:
-                step = min(step, (clear - 0.5 * touch) / levers[p])
-        place_capsules(d, bones, frames, capsules, ends)
-        stop = max(stop, touched_digit(d, bones, radii, room, ends, done))
-        any_going = False
-        step = max(step, LEAST_STEP)
-        for b in range(first, end):
-            if b <= stop:
-                going[b] = False
-            if going[b]:
-                rate = LAST_RATIO if b == last_moving and last_moving > first else 1.0
-                angle = min(angles[b] + step * rate, max(high[b], angles[b]))
-                if angle <= angles[b]:
-                    going[b] = False
-                else:
-                    angles[b] = angle
-                    any_going = True
-        if not any_going:
+                step = min(step, (clear - 0.5 * touch) / skin.levers[p])
+        place_capsules(d, chains, skin, state)
+        stop = max(stop, touched_digit(d, chains, skin, state))
+        if not curl(d, stop, max(step, LEAST_STEP), last_moving, chains, state):
             break
     return least
 
 
-@kernel
-def pad_fit(
-    b: int, frames: FloatArray, pads: FloatArray, pad_normals: FloatArray, values: FloatArray, origin:
-    FloatArray, spacing: float, bar: FloatArray, out: FloatArray,
-) -> None:  # fmt: skip
+@inlined
+def curl(d: int, stop: int, step: float, last_moving: int, chains: Chains, state: State) -> bool:
+    """Bend the bones of digit d beyond `stop` by a step (radians), as far as they go; whether any did."""
+    first, bends = chains.bones[d], False
+    for b in range(first, chains.bones[d + 1]):
+        if b <= stop:
+            state.going[b] = False
+        if state.going[b]:
+            rate = LAST_RATIO if b == last_moving and last_moving > first else 1.0
+            angle = min(state.angles[b] + step * rate, max(state.ceiling[b], state.angles[b]))
+            state.going[b] = angle > state.angles[b]
+            state.angles[b] = angle
+            bends = bends or state.going[b]
+    return bends
+
+
+@inner
+def pad_fit(b: int, bar: FloatArray, skin: Skin, grid: Grid, state: State, out: FloatArray) -> None:
     """Of the pad below bone b: out = distance, n . gradient, gradient (3), position (3)."""
-    h = 0.5 * spacing
-    x, y, z = moved(frames[b], pads[b], 0), moved(frames[b], pads[b], 1), moved(frames[b], pads[b], 2)
-    out[0] = distance_at(values, origin, spacing, bar, x, y, z)
-    gx = distance_at(values, origin, spacing, bar, x + h, y, z)
-    gx -= distance_at(values, origin, spacing, bar, x - h, y, z)
-    gy = distance_at(values, origin, spacing, bar, x, y + h, z)
-    gy -= distance_at(values, origin, spacing, bar, x, y - h, z)
-    gz = distance_at(values, origin, spacing, bar, x, y, z + h)
-    gz -= distance_at(values, origin, spacing, bar, x, y, z - h)
+    h, frame, pad, normal = 0.5 * grid.spacing, state.frames[b], skin.pads[b], skin.pad_normals[b]
+    x, y, z = moved(frame, pad)
+    out[0] = distance_beside(grid, bar, x, y, z)
+    gx = distance_beside(grid, bar, x + h, y, z) - distance_beside(grid, bar, x - h, y, z)
+    gy = distance_beside(grid, bar, x, y + h, z) - distance_beside(grid, bar, x, y - h, z)
+    gz = distance_beside(grid, bar, x, y, z + h) - distance_beside(grid, bar, x, y, z - h)
     size = max(np.sqrt(gx * gx + gy * gy + gz * gz), 1e-30)
     out[2], out[3], out[4] = gx / size, gy / size, gz / size
     out[5], out[6], out[7] = x, y, z
     out[1] = 0.0
     for i in range(3):
-        n = frames[b, i, 0] * pad_normals[b, 0] + frames[b, i, 1] * pad_normals[b, 1]
-        n += frames[b, i, 2] * pad_normals[b, 2]
+        n = frame[i, 0] * normal[0] + frame[i, 1] * normal[1]
+        n += frame[i, 2] * normal[2]
         out[1] += n * out[2 + i]
 
 
-@kernel
-def approach_one(
-    frame: FloatArray, way: FloatArray, tested: FloatArray, tested_bones: IntArray, bones: IntArray, links:
-    FloatArray, pres: FloatArray, axes: FloatArray, angles: FloatArray, frames: FloatArray, values: FloatArray,
-    origin: FloatArray, spacing: float, bar: FloatArray, touch: float,
-) -> float:  # fmt: skip
+@inner
+def approach(
+    frame: FloatArray,
+    way: FloatArray,
+    bar: FloatArray,
+    chains: Chains,
+    skin: Skin,
+    grid: Grid,
+    touch: float,
+    state: State,
+) -> float:
     """Move `frame` back along `way` (3,) until the tested skin is clear, then on until it touches.
 
-    tested_bones: the bone that carries each point, -1 for the palm. Returns how far it went; inf where it passes
-    by.
+    Returns how far it went; inf where it passes by. Bones of tested skin are -1 for the palm.
     """
-    for d in range(len(bones) - 1):
-        pose_digit(d, frame, bones, links, pres, axes, angles, frames)
-    reach = spacing * (values.shape[0] + values.shape[1] + values.shape[2])
+    for d in range(len(chains.bones) - 1):
+        pose_digit(d, frame, chains, state)
+    values = grid.values
+    reach = grid.spacing * (values.shape[0] + values.shape[1] + values.shape[2])
     travelled, forward = 0.0, False
     for _ in range(ROUNDS):
         least = np.inf
-        for p in range(len(tested)):
-            b = tested_bones[p]
-            carrier = frame if b < 0 else frames[b]
-            least = min(least, distance_at(
-                values, origin, spacing, bar, moved(carrier, tested[p], 0) + travelled * way[0],
-                moved(carrier, tested[p], 1) + travelled * way[1],
-                moved(carrier, tested[p], 2) + travelled * way[2],
-            ))  # fmt: skip
+        for p in range(len(skin.tested)):
+            b = skin.tested_bones[p]
+            x, y, z = moved(frame if b < 0 else state.frames[b], skin.tested[p])
+            x, y, z = x + travelled * way[0], y + travelled * way[1], z + travelled * way[2]
+            least = min(least, distance_beside(grid, bar, x, y, z))
         if least >= 0.0:
             forward = True
             if least < touch:
@@ -272,20 +387,23 @@ def approach_one(
     return travelled
 
 
-@kernel
-def clearance(
-    d: int, frames: FloatArray, probes: FloatArray, probe_bones: IntArray, probe_starts: IntArray, values:
-    FloatArray, origin: FloatArray, spacing: float,
-) -> float:  # fmt: skip
+@inner
+def clearance_of_digit(d: int, skin: Skin, grid: Grid, state: State) -> float:
     """The least signed distance of digit d's skin to the object."""
     least = np.inf
-    for p in range(probe_starts[d], probe_starts[d + 1]):
-        b = probe_bones[p]
-        clear = field_at(
-            values, origin, spacing, moved(frames[b], probes[p], 0), moved(frames[b], probes[p], 1),
-            moved(frames[b], probes[p], 2),
-        )  # fmt: skip
-        least = min(least, clear)
+    for p in range(skin.probe_starts[d], skin.probe_starts[d + 1]):
+        x, y, z = moved(state.frames[skin.probe_bones[p]], skin.probes[p])
+        least = min(least, distance_at(grid, x, y, z))
+    return least
+
+
+@inner
+def clearance_of(points: FloatArray, frame: FloatArray, grid: Grid) -> float:
+    """The least signed distance of points (k, 3) in a frame to the object."""
+    least = np.inf
+    for p in range(len(points)):
+        x, y, z = moved(frame, points[p])
+        least = min(least, distance_at(grid, x, y, z))
     return least
 
 
@@ -319,197 +437,264 @@ def between(prices: FloatArray, counts: IntArray, low: FloatArray, high: FloatAr
     return total
 
 
-@kernel
+@inner
 def misfit_of(
-    d: int, least: float, price: float, bones: IntArray, frames: FloatArray, pads: FloatArray, pad_normals:
-    FloatArray, has_pad: BoolArray, capsules: FloatArray, values: FloatArray, origin: FloatArray, spacing: float,
-    bar: FloatArray, length: float, oppose: float, along: float, mean: FloatArray, normals: FloatArray,
-    is_thumb: bool, fit: FloatArray,
-) -> float:  # fmt: skip
+    d: int,
+    least: float,
+    price: float,
+    bar: FloatArray,
+    chains: Chains,
+    skin: Skin,
+    grid: Grid,
+    rules: Rules,
+    state: State,
+) -> float:
     """What is amiss with a closed digit, in hand lengths: skin in the object, pads off it, and of a thumb that it
-    does not press against the fingers (`mean`, their normal on the object) or lies along what they go round.
+    does not press against the fingers or lies along what they go round.
 
-    normals: (3, 3) the mean of n n^T of the object's normals under the fingers. A thumb is across a rod where its
-    tip points the way in which they vary; for a ball or a plate no way is better than another.
+    A thumb is across a rod where its tip points the way in which the normals under the fingers vary; for a ball or
+    a plate no way is better than another.
     """
-    misfit = price - 3.0 * min(least, 0.0) / length
-    count, against = 0.0, 0.0
-    for b in range(bones[d], bones[d + 1]):
-        if has_pad[b]:
-            pad_fit(b, frames, pads, pad_normals, values, origin, spacing, bar, fit)
+    misfit = price - 3.0 * min(least, 0.0) / rules.length
+    count, against, fit = 0.0, 0.0, state.fit
+    for b in range(chains.bones[d], chains.bones[d + 1]):
+        if skin.has_pad[b]:
+            pad_fit(b, bar, skin, grid, state, fit)
             count += 1.0
-            misfit += abs(fit[0]) / length + TURNED * (1.0 + fit[1])
-            against += fit[2] * mean[0] + fit[3] * mean[1] + fit[4] * mean[2]
-    if is_thumb and count > 0.0:
-        misfit += oppose * max(against / count + 0.6, 0.0)
-        last = bones[d + 1] - 1
-        size, across = 1e-30, 0.0
-        for i in range(3):
-            u = moved(frames[last], capsules[last, 1], i) - moved(frames[last], capsules[last, 0], i)
-            fit[i] = u
-            size += u * u
-        for i in range(3):
-            for j in range(3):
-                across += fit[i] * normals[i, j] * fit[j]
-        misfit += along * max(1.0 - 3.0 * across / size, 0.0)
+            misfit += abs(fit[0]) / rules.length + TURNED * (1.0 + fit[1])
+            against += fit[2] * state.mean[0] + fit[3] * state.mean[1] + fit[4] * state.mean[2]
+    if d == chains.thumb and count > 0.0:
+        misfit += rules.oppose * max(against / count + 0.6, 0.0)
+        misfit += rules.along * max(1.0 - across(d, chains, skin, state), 0.0)
     return misfit
+
+
+@inlined
+def across(d: int, chains: Chains, skin: Skin, state: State) -> float:
+    """Three times the share of the normals' variance that lies along the last bone of digit d: 1 where no way is
+    better than another."""
+    last, tip = chains.bones[d + 1] - 1, state.fit
+    x, y, z = moved(state.frames[last], skin.capsules[last, 1])
+    u, v, w = moved(state.frames[last], skin.capsules[last, 0])
+    tip[0], tip[1], tip[2] = x - u, y - v, z - w
+    size, along = 1e-30, 0.0
+    for i in range(3):
+        size += tip[i] * tip[i]
+    for i in range(3):
+        for j in range(3):
+            along += tip[i] * state.normals[i, j] * tip[j]
+    return 3.0 * along / size
+
+
+@inner
+def take_start(d: int, tried: int, starts: Starts, chains: Chains, state: State) -> float:
+    """Put the first bone of digit d where one of its starts puts it; returns the price of that."""
+    first = chains.firsts[d]
+    copy_turn(starts.turns[d, tried], state.turns[first])
+    if d == chains.thumb:
+        state.angles[first] = starts.angles[d, tried]
+    return starts.prices[d, tried]
+
+
+@inlined
+def place_of_start(chosen: int, starts: Starts, at: FloatArray) -> None:
+    """Write twist, spread and flexion of a thumb's start to `at` (3,)."""
+    for k in range(2, -1, -1):
+        at[k] = chosen % starts.ways[k] * (starts.high[k] - starts.low[k]) / (starts.ways[k] - 1.0)
+        at[k] += starts.low[k]
+        chosen = chosen // starts.ways[k]
+
+
+@inner
+def look_about(near: int, step: float, starts: Starts, chains: Chains, state: State, best: Best) -> float:
+    """Put the thumb beside the best so far, a step (of the spacing of the starts) one way of each of three; returns
+    the price of that."""
+    for k in range(3):
+        best.trial[k] = best.at[k]
+    k = near % 6 // 2
+    stride = step * (starts.high[k] - starts.low[k]) / (starts.ways[k] - 1.0)
+    best.trial[k] += stride if near % 2 else -stride
+    best.trial[k] = min(max(best.trial[k], starts.low[k]), starts.high[k])
+    first = chains.firsts[chains.thumb]
+    turned_root(state.turns[first], starts.frame, best.trial[0], best.trial[1])
+    state.angles[first] = best.trial[2]
+    return between(starts.prices[chains.thumb], starts.ways, starts.low, starts.high, best.trial)
+
+
+@inner
+def close_best(
+    d: int,
+    base: FloatArray,
+    bar: FloatArray,
+    curl: float,
+    chains: Chains,
+    skin: Skin,
+    starts: Starts,
+    grid: Grid,
+    rules: Rules,
+    state: State,
+    best: Best,
+) -> None:
+    """Close digit d from each of its starts, then of a thumb from what is near the best of them, in steps that
+    halve; it ends as it fits best."""
+    first, end = chains.bones[d], chains.bones[d + 1]
+    least_misfit, chosen, step, better = np.inf, ZERO, 0.5, True
+    more = 6 * starts.ways[3] if d == chains.thumb and starts.counts[d] > 1 else ZERO
+    for tried in range(starts.counts[d] + more):
+        near = tried - starts.counts[d]
+        open_digit(d, curl, chains, state)
+        if near < 0:
+            price = take_start(d, tried, starts, chains, state)
+        else:
+            if near == 0:
+                place_of_start(chosen, starts, best.at)
+            if near % 6 == 0:
+                step = step if better else 0.5 * step
+                better = False
+            price = look_about(near, step, starts, chains, state, best)
+        clear = close_digit(d, base, bar, chains, skin, grid, rules.touch, state)
+        misfit = misfit_of(d, clear, price, bar, chains, skin, grid, rules, state)
+        if misfit < least_misfit - BEST:
+            least_misfit, better = misfit, True
+            if near < 0:
+                chosen = tried
+            else:
+                for k in range(3):
+                    best.at[k] = best.trial[k]
+            for b in range(first, end):
+                best.angles[b] = state.angles[b]
+            copy_turn(state.turns[chains.firsts[d]], best.turn)
+    copy_turn(best.turn, state.turns[chains.firsts[d]])
+    for b in range(first, end):
+        state.angles[b] = best.angles[b]
+    pose_digit(d, base, chains, state)
+
+
+@inner
+def open_digit(d: int, curl: float, chains: Chains, state: State) -> None:
+    """Bend digit d by a share of its limits, a thumb not at all, and let all that bends move; of a thumb all but
+    the first, whose angle is a part of its start."""
+    for b in range(chains.bones[d], chains.bones[d + 1]):
+        state.moves[b] = chains.flexes[b]
+        state.angles[b] = 0.0
+        if chains.flexes[b] and d != chains.thumb:
+            state.angles[b] = min(max(curl * chains.high[b], chains.low[b]), chains.high[b])
+    if d == chains.thumb:
+        state.moves[chains.firsts[d]] = False
+
+
+@inner
+def close_on_whole(
+    d: int, base: FloatArray, chains: Chains, skin: Skin, grid: Grid, touch: float, state: State
+) -> None:
+    """Close digit d again, on all of the object: there is no room beside the bar."""
+    for b in range(chains.bones[d], chains.bones[d + 1]):
+        state.moves[b] = chains.flexes[b] and not (d == chains.thumb and b == chains.firsts[d])
+        if state.moves[b]:
+            state.angles[b] = 0.0
+    close_digit(d, base, state.whole, chains, skin, grid, touch, state)
+    pose_digit(d, base, chains, state)
+
+
+@inner
+def open_hand(n: int, placed: Placed, chains: Chains, state: State) -> None:
+    """Hand n before its approach: digits bent by a share of their limits, the thumb not; none is closed."""
+    state.normals[:] = 0.0
+    state.mean[:] = 0.0
+    state.turns[:] = 0.0
+    state.done[:] = False
+    for d in range(len(chains.bones) - 1):
+        for b in range(chains.bones[d], chains.bones[d + 1]):
+            state.ceiling[b] = placed.limits[n, d] * chains.high[b]
+            wanted = placed.curls[n] * chains.high[b] if chains.flexes[b] else 0.0
+            state.angles[b] = 0.0 if d == chains.thumb else min(max(wanted, chains.low[b]), chains.high[b])
+            for i in range(3):
+                state.turns[b, i, i] = 1.0
+
+
+@inner
+def press(d: int, chains: Chains, skin: Skin, grid: Grid, rules: Rules, state: State, fits: FloatArray) -> float:
+    """Write how the pads of digit d fit to fits (B, 8), and add the normals under those of a finger that press to
+    the sums in state; returns how many press."""
+    pressing = 0.0
+    for b in range(chains.bones[d], chains.bones[d + 1]):
+        if not skin.has_pad[b]:
+            continue
+        pad_fit(b, state.whole, skin, grid, state, fits[b])
+        if d != chains.thumb and abs(fits[b, 0]) < rules.on * rules.length:
+            pressing += 1.0
+            for i in range(3):
+                state.mean[i] += fits[b, 2 + i]
+                for j in range(3):
+                    state.normals[i, j] += fits[b, 2 + i] * fits[b, 2 + j]
+    return pressing
+
+
+@inner
+def average(pressing: float, state: State) -> None:
+    """Make a mean of the sums of the normals under fingers that press."""
+    size = np.sqrt(state.mean[0] ** 2 + state.mean[1] ** 2 + state.mean[2] ** 2)
+    if size > 0.0:
+        for i in range(3):
+            state.mean[i] = state.mean[i] / size
+            for j in range(3):
+                state.normals[i, j] = state.normals[i, j] / pressing
+
+
+@inner
+def close_hand(
+    n: int,
+    placed: Placed,
+    chains: Chains,
+    skin: Skin,
+    starts: Starts,
+    grid: Grid,
+    rules: Rules,
+    state: State,
+    best: Best,
+    found: Found,
+) -> None:
+    """Close the digits of hand n where the approach left it, in their order, the thumb last: where it presses
+    depends on the fingers."""
+    digits, pressing, base, bar = len(chains.bones) - 1, 0.0, placed.frames[n], placed.bars[n]
+    for turn in range(digits):
+        d = turn if chains.thumb < 0 else (turn + 1 if turn + 1 < digits else ZERO)
+        close_best(d, base, bar, placed.curls[n], chains, skin, starts, grid, rules, state, best)
+        copy_turn(best.turn, found.turns[n, d])
+        clear = clearance_of_digit(d, skin, grid, state)
+        if bar[6] > 0.0 and clear < -OUT_OF_BAR * rules.length:
+            close_on_whole(d, base, chains, skin, grid, rules.touch, state)
+            clear = clearance_of_digit(d, skin, grid, state)
+        found.clear[n, d] = clear
+        for b in range(chains.bones[d], chains.bones[d + 1]):
+            found.angles[n, b] = state.angles[b]
+        place_capsules(d, chains, skin, state)
+        state.done[d] = True
+        pressing += press(d, chains, skin, grid, rules, state, found.fits[n])
+        if turn == digits - 2:
+            average(pressing, state)
 
 
 @kernel
 def close_all(
-    placed: FloatArray, ways: FloatArray, bars: FloatArray, curls: FloatArray, limits: FloatArray, bones:
-    IntArray, links: FloatArray, axes: FloatArray, low: FloatArray, high: FloatArray, flexes: BoolArray, thumb:
-    int, starts: FloatArray, start_counts: IntArray, start_angles: FloatArray, start_prices: FloatArray, probes:
-    FloatArray, probe_bones: IntArray, probe_starts: IntArray, levers: FloatArray, tested: FloatArray,
-    tested_bones: IntArray, rest: FloatArray, pads: FloatArray, pad_normals: FloatArray, has_pad: BoolArray,
-    capsules: FloatArray, radii: FloatArray, room: FloatArray, values: FloatArray, origin: FloatArray, spacing:
-    float, touch: float, on: float, length: float, oppose: float, along: float, looks: IntArray, look_frame:
-    FloatArray, look_low: FloatArray, look_high: FloatArray, out_angles: FloatArray, out_turns: FloatArray,
-    out_fits: FloatArray, out_clear: FloatArray, out_rest: FloatArray, out_palm: FloatArray, out_travel:
-    FloatArray, pres: FloatArray, angles: FloatArray, frames: FloatArray, ends: FloatArray, done: BoolArray, going:
-    BoolArray, moves: BoolArray, best_angles: FloatArray, fit: FloatArray, mean: FloatArray, none: FloatArray,
-    firsts: IntArray, ceiling: FloatArray, leads: IntArray, ratios: FloatArray, normals: FloatArray, at:
-    FloatArray, best_at: FloatArray, best_turn: FloatArray,
-) -> None:  # fmt: skip
-    """Approach and close a hand at every placement (see `closing.close_hands` for the arrays)."""
-    digits = len(bones) - 1
-    for n in range(len(placed)):
-        bar = bars[n]
-        for b in range(len(links)):
-            angles[b] = min(max(curls[n] * high[b] if flexes[b] else 0.0, low[b]), high[b])
-            for i in range(3):
-                for j in range(3):
-                    pres[b, i, j] = 1.0 if i == j else 0.0
-        if thumb >= 0:
-            for b in range(bones[thumb], bones[thumb + 1]):
-                angles[b] = 0.0
-        out_travel[n] = 0.0
-        if ways[n, 0] != 0.0 or ways[n, 1] != 0.0 or ways[n, 2] != 0.0:
-            out_travel[n] = approach_one(
-                placed[n], ways[n], tested, tested_bones, bones, links, pres, axes, angles, frames, values, origin,
-                spacing, bar, touch,
-            )  # fmt: skip
-        if not np.isfinite(out_travel[n]):
-            continue
-        for d in range(digits):
-            done[d] = False
-            for b in range(bones[d], bones[d + 1]):
-                ceiling[b] = limits[n, d] * high[b]
-        mean[0] = mean[1] = mean[2] = 0.0
-        pressing = 0.0
-        for i in range(3):
-            for j in range(3):
-                normals[i, j] = 0.0
-        for turn in range(digits):
-            d = turn if thumb < 0 else (turn + 1 if turn + 1 < digits else ZERO)  # digits in order, the thumb last
-            first, end = bones[d], bones[d + 1]
-            best = np.inf
-            chosen, step, better = ZERO, 0.5, True
-            more = 6 * looks[3] if d == thumb and start_counts[d] > 1 else ZERO
-            # its starts, then of a thumb what is near the best of them, either way of each of three, in steps that
-            # halve
-            for tried in range(start_counts[d] + more):
-                price, near = 0.0, tried - start_counts[d]
-                for b in range(first, end):
-                    moves[b] = flexes[b]
-                    angles[b] = min(max(curls[n] * high[b], low[b]), high[b]) if flexes[b] and d != thumb else 0.0
-                if near < 0:
-                    price = start_prices[d, tried]
-                    for i in range(3):
-                        for j in range(3):
-                            pres[firsts[d], i, j] = starts[d, tried, i, j]
-                    if d == thumb:
-                        angles[firsts[d]] = start_angles[d, tried]
-                else:
-                    if near == 0:
-                        for k in range(2, -1, -1):
-                            best_at[k] = chosen % looks[k] * (look_high[k] - look_low[k]) / (looks[k] - 1.0)
-                            best_at[k] += look_low[k]
-                            chosen = chosen // looks[k]
-                    if near % 6 == 0:
-                        step = step if better else 0.5 * step
-                        better = False
-                    for k in range(3):
-                        at[k] = best_at[k]
-                    k = near % 6 // 2
-                    stride = step * (look_high[k] - look_low[k]) / (looks[k] - 1.0)
-                    at[k] = min(max(at[k] + (stride if near % 2 else -stride), look_low[k]), look_high[k])
-                    price = between(start_prices[d], looks, look_low, look_high, at)
-                    turned_root(pres[firsts[d]], look_frame, at[0], at[1])
-                    angles[firsts[d]] = at[2]
-                if d == thumb:
-                    moves[firsts[d]] = False
-                least = close_digit(
-                    d, placed[n], bones, links, pres, axes, ceiling, moves, angles, frames, probes, probe_bones,
-                    probe_starts, levers, values, origin, spacing, bar, touch, capsules, radii, room, ends, done,
-                    going, leads, ratios,
-                )  # fmt: skip
-                misfit = misfit_of(
-                    d, least, price, bones, frames, pads, pad_normals, has_pad, capsules, values, origin, spacing,
-                    bar, length, oppose, along, mean, normals, d == thumb, fit,
-                )  # fmt: skip
-                if misfit < best - 1e-12:
-                    best, better = misfit, True
-                    if near < 0:
-                        chosen = tried
-                    else:
-                        for k in range(3):
-                            best_at[k] = at[k]
-                    for b in range(first, end):
-                        best_angles[b] = angles[b]
-                    for i in range(3):
-                        for j in range(3):
-                            best_turn[i, j] = pres[firsts[d], i, j]
-            for i in range(3):
-                for j in range(3):
-                    pres[firsts[d], i, j] = best_turn[i, j]
-                    out_turns[n, d, i, j] = best_turn[i, j]
-            for b in range(first, end):
-                angles[b] = best_angles[b]
-                out_angles[n, b] = best_angles[b]
-            pose_digit(d, placed[n], bones, links, pres, axes, angles, frames)
-            out_clear[n, d] = clearance(d, frames, probes, probe_bones, probe_starts, values, origin, spacing)
-            if (
-                bar[6] > 0.0 and out_clear[n, d] < -OUT_OF_BAR * length
-            ):  # no room beside the bar: close on all of it
-                for b in range(first, end):
-                    moves[b] = flexes[b] and not (d == thumb and b == firsts[d])
-                    angles[b] = 0.0 if moves[b] else angles[b]
-                close_digit(
-                    d, placed[n], bones, links, pres, axes, ceiling, moves, angles, frames, probes, probe_bones,
-                    probe_starts, levers, values, origin, spacing, none, touch, capsules, radii, room, ends, done,
-                    going, leads, ratios,
-                )  # fmt: skip
-                for b in range(first, end):
-                    out_angles[n, b] = angles[b]
-                pose_digit(d, placed[n], bones, links, pres, axes, angles, frames)
-                out_clear[n, d] = clearance(d, frames, probes, probe_bones, probe_starts, values, origin, spacing)
-            place_capsules(d, bones, frames, capsules, ends)
-            done[d] = True
-            for b in range(first, end):
-                if has_pad[b]:
-                    pad_fit(b, frames, pads, pad_normals, values, origin, spacing, none, out_fits[n, b])
-                    if d != thumb and abs(out_fits[n, b, 0]) < on * length:
-                        pressing += 1.0
-                        for i in range(3):
-                            mean[i] += out_fits[n, b, 2 + i]
-                            for j in range(3):
-                                normals[i, j] += out_fits[n, b, 2 + i] * out_fits[n, b, 2 + j]
-            size = np.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
-            if turn == digits - 2 and size > 0.0:
-                for i in range(3):
-                    mean[i] = mean[i] / size
-                    for j in range(3):
-                        normals[i, j] = normals[i, j] / pressing
-        out_rest[n] = np.inf
-        for p in range(len(rest)):
-            out_rest[n] = min(out_rest[n], field_at(
-                values, origin, spacing, moved(placed[n], rest[p], 0), moved(placed[n], rest[p], 1),
-                moved(placed[n], rest[p], 2),
-            ))  # fmt: skip
-        out_palm[n] = np.inf
-        for p in range(len(tested)):
-            out_palm[n] = min(out_palm[n], field_at(
-                values, origin, spacing, moved(placed[n], tested[p], 0), moved(placed[n], tested[p], 1),
-                moved(placed[n], tested[p], 2),
-            ))  # fmt: skip
+    placed: Placed,
+    chains: Chains,
+    skin: Skin,
+    starts: Starts,
+    grid: Grid,
+    rules: Rules,
+    state: State,
+    best: Best,
+    found: Found,
+) -> None:
+    """Approach and close a hand at every placement."""
+    for n in range(len(placed.frames)):
+        frame, way = placed.frames[n], placed.ways[n]
+        open_hand(n, placed, chains, state)
+        found.travel[n] = 0.0
+        if way[0] != 0.0 or way[1] != 0.0 or way[2] != 0.0:
+            found.travel[n] = approach(frame, way, placed.bars[n], chains, skin, grid, rules.touch, state)
+        if np.isfinite(found.travel[n]):
+            close_hand(n, placed, chains, skin, starts, grid, rules, state, best, found)
+            found.rest[n] = clearance_of(skin.rest, frame, grid)
+            found.palm[n] = clearance_of(skin.tested, frame, grid)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.geometry.jit import constant, kernel
+from contact_core.geometry.jit import constant, inner, kernel
 
 VECTOR, EULER = constant(1), constant(2)  # kinds, as Chart lays them out; 0 does not turn
 
@@ -67,14 +67,14 @@ def turns(
         motion[j, 3, 3] = 1.0
 
 
-@kernel
+@inner
 def _write_identity(turn: FloatArray) -> None:
     for a in range(3):
         for b in range(3):
             turn[a, b] = 1.0 if a == b else 0.0
 
 
-@kernel
+@inner
 def _write_exponential(x: float, y: float, z: float, turn: FloatArray, left: FloatArray) -> None:
     """Write the rotation of a rotation vector, and its left Jacobian, as `rotations.exponential` has them."""
     square = x * x + y * y + z * z
@@ -148,7 +148,7 @@ def move(
                     generators[moving[j] + q, a, 3] = frame[a, q]
 
 
-@kernel
+@inner
 def _write_product(one: FloatArray, two: FloatArray, product: FloatArray) -> None:
     """Write the product of two affine transforms (4, 4)."""
     for a in range(3):
@@ -159,7 +159,7 @@ def _write_product(one: FloatArray, two: FloatArray, product: FloatArray) -> Non
     product[3, 3] = 1.0
 
 
-@kernel
+@inner
 def _write_cross(frame: FloatArray, axis: FloatArray, field: FloatArray) -> None:
     """Write how points turn about an axis (3,) of a rigid frame (4, 4)."""
     x = frame[0, 0] * axis[0] + frame[0, 1] * axis[1] + frame[0, 2] * axis[2]
@@ -170,7 +170,7 @@ def _write_cross(frame: FloatArray, axis: FloatArray, field: FloatArray) -> None
     field[1, 0], field[0, 1] = z, -z
 
 
-@kernel
+@inner
 def _write_sheared(frame: FloatArray, axis: FloatArray, scratch: FloatArray, field: FloatArray) -> None:
     """Write A [axis] A^-1 with A the linear part of a frame (4, 4): a scaled parent makes a shear of a turn."""
     for c in range(3):

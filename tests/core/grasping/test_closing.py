@@ -175,14 +175,14 @@ def test_a_start_is_a_turn_of_the_chart_and_so_is_what_lies_between() -> None:
     one = hand()
     x, y = 0.3, -0.7
     out = np.zeros((3, 3))
-    turned_root(out, one.look_frame, x, y)
+    turned_root.py_func(out, one.look_frame, x, y)
     expected = one.look_frame @ turn_about(np.eye(3)[0], x) @ turn_about(np.eye(3)[1], y) @ one.look_frame.T
     assert np.allclose(out, expected, atol=1e-12)
     prices = one.start_prices[one.thumb]
     for place in (0, 7, len(prices) - 1):
         node = np.array(np.unravel_index(place, one.looks[:3]))
         at = one.look_low + node * (one.look_high - one.look_low) / (one.looks[:3] - 1)
-        assert between(prices, one.looks, one.look_low, one.look_high, at) == pytest.approx(prices[place])
-        turned_root(out, one.look_frame, at[0], at[1])
+        assert between.py_func(prices, one.looks, one.look_low, one.look_high, at) == pytest.approx(prices[place])
+        turned_root.py_func(out, one.look_frame, at[0], at[1])
         assert np.allclose(out, one.starts[one.thumb, place], atol=1e-9)
         assert at[2] == pytest.approx(one.start_angles[one.thumb, place])
