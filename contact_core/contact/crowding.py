@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from contact_core.arrays import BoolArray, FloatArray
+from contact_core.geometry.thinning import meeting, spacing_of
 
 MEET = 0.75  # times the spacing of the points: so near they lie on one another there
 APART = 4.0  # times the spacing: so far they are different parts here
-NEIGHBOURS = 8  # there, of each point, that are looked at
 SAMPLED = 100  # points, at least, whose spacing is measured
 
 
@@ -22,16 +22,7 @@ def crowded_points(here: FloatArray, there: FloatArray) -> BoolArray:
 
     Both in the same units. None is crowded where there are fewer than two points, or all lie in one place here.
     """
-    from scipy.spatial import cKDTree
-
-    n = len(here)
-    crowded = np.zeros(n, bool)
-    if n < 2:
-        return crowded
-    spacing = float(np.median(cKDTree(here).query(here[:: max(1, n // SAMPLED)], k=2)[0][:, 1]))
-    k = min(NEIGHBOURS, n)
-    distance, other = cKDTree(there).query(there, k=k, distance_upper_bound=MEET * spacing)  # (n, k)
-    point, column = np.nonzero(np.isfinite(distance))
-    apart = np.linalg.norm(here[point] - here[other[point, column]], axis=1)
-    crowded[point[apart > APART * spacing]] = True
-    return crowded
+    if len(here) < 2:
+        return np.zeros(len(here), bool)
+    spacing = spacing_of(here, SAMPLED)
+    return meeting(there, here, MEET * spacing, APART * spacing)

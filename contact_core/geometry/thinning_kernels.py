@@ -1,4 +1,4 @@
-"""The kernel of thinning: points in order, each against the kept ones in its own and the 26 neighbouring cells.
+"""Kernels that compare points with those in their own and the 26 neighbouring cells of a grid (see thinning.py).
 
 Cells are found by a hash table of chains. Two cells that share a chain do no harm, because the distance to every
 candidate is measured.
@@ -6,10 +6,27 @@ candidate is measured.
 
 from __future__ import annotations
 
-from contact_core.arrays import BoolArray, FloatArray, IntArray
-from contact_core.geometry.jit import constant, kernel
+import numpy as np
 
+from contact_core.arrays import BoolArray, FloatArray, IntArray
+from contact_core.geometry.jit import constant, inlined, kernel
+
+OWN = constant(13)
 _X, _Y, _Z = constant(73856093), constant(19349663), constant(83492791)  # primes, Teschner et al. 2003
+
+
+@inlined
+def chain_of(cells: IntArray, k: int, step: int, mask: int) -> int:
+    """Where the chain begins of the cell of row k, or of one beside it: step 13 of 27 is its own."""
+    i, j, h = cells[k, 0] + step % 3 - 1, cells[k, 1] + step // 3 % 3 - 1, cells[k, 2] + step // 9 - 1
+    return (i * _X ^ j * _Y ^ h * _Z) & mask
+
+
+@inlined
+def square_distance(points: FloatArray, k: int, other: int) -> float:
+    """Of rows k and other of points (n, 3)."""
+    x, y, z = points[k, 0] - points[other, 0], points[k, 1] - points[other, 1], points[k, 2] - points[other, 2]
+    return x * x + y * y + z * z
 
 
 @kernel
@@ -24,22 +41,50 @@ def keep_first(
     mask = len(heads) - 1
     limit = apart * apart
     for k in range(len(points)):
-        x, y, z = points[k, 0], points[k, 1], points[k, 2]
-        i, j, h = cells[k, 0], cells[k, 1], cells[k, 2]
         free = True
         for step in range(27):
-            slot = ((i + step % 3 - 1) * _X ^ (j + step // 3 % 3 - 1) * _Y ^ (h + step // 9 - 1) * _Z) & mask
-            other = heads[slot]
-            while other >= 0:
-                u, v, w = points[other, 0] - x, points[other, 1] - y, points[other, 2] - z
-                if u * u + v * v + w * w <= limit:
-                    free = False
-                    break
+            other = heads[chain_of(cells, k, step, mask)]
+            while other >= 0 and square_distance(points, k, other) > limit:
                 other = later[other]
-            if not free:
+            if other >= 0:
+                free = False
                 break
         if free:
-            slot = (i * _X ^ j * _Y ^ h * _Z) & mask
+            slot = chain_of(cells, k, OWN, mask)
             later[k] = heads[slot]
             heads[slot] = k
             kept[k] = True
+
+
+@kernel
+def find_meeting(
+    points: FloatArray, others: FloatArray, cells: IntArray, near: float, apart: float, heads: IntArray,
+    later: IntArray, meets: BoolArray,
+) -> None:  # fmt: skip
+    """Mark in `meets` (n,) the points (n, 3) that have one within `near` whose row of others (n, 3) is farther than
+    `apart` from theirs. The rest as for `keep_first`."""
+    mask = len(heads) - 1
+    for k in range(len(points)):
+        slot = chain_of(cells, k, OWN, mask)
+        later[k] = heads[slot]
+        heads[slot] = k
+    for k in range(len(points)):
+        for step in range(27):
+            if meets[k]:
+                break
+            other = heads[chain_of(cells, k, step, mask)]
+            while other >= 0 and not meets[k]:
+                if square_distance(points, k, other) <= near * near:
+                    meets[k] = square_distance(others, k, other) > apart * apart
+                other = later[other]
+
+
+@kernel
+def find_nearest(points: FloatArray, every: int, distances: FloatArray) -> None:
+    """Write the distance of each `every`-th point (n, 3) from the nearest other one."""
+    for i in range(len(distances)):
+        least = np.inf
+        for other in range(len(points)):
+            if other != every * i:
+                least = min(least, square_distance(points, every * i, other))
+        distances[i] = np.sqrt(least)

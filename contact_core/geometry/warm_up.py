@@ -10,6 +10,7 @@ from contact_core.geometry.exact_geodesics import exact_geodesic
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
+from contact_core.geometry.thinning import first_of_each, meeting, spacing_of
 from contact_core.geometry.topology import Topology
 
 
@@ -24,4 +25,6 @@ def warm_up() -> float:
     path = exact_geodesic(mesh, ends[0], ends[1])
     headings = np.array([path.heading, path.ending_heading])
     direction_to_heading(mesh, ends, heading_to_direction(mesh, ends, headings))
+    first_of_each(points, 0.1)
+    meeting(mesh.points, mesh.points, 0.1, spacing_of(mesh.points, 2))
     return time.perf_counter() - start

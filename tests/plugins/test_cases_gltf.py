@@ -302,7 +302,7 @@ def test_reflections_anywhere_above_a_skin(tmp_path: Path, scale: tuple[int, ...
 # What is written
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(-2, 2, width=32), min_size=12, max_size=12), st.booleans())
 def test_any_matrix_is_written_as_nodes_that_viewers_multiply_to_it(numbers: list[float], flat: bool) -> None:
     matrix = np.eye(4)

@@ -36,7 +36,7 @@ def survive(folder: Path, name: str, content: bytes) -> None:
         assert np.isfinite(asset.mesh.points).all() and len(asset.mesh.faces)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_bytes_changed_or_cut(tmp_path: Path, data: st.DataObject) -> None:
     content = bytearray(GLB)
@@ -60,7 +60,7 @@ def _places(value: object, path: tuple[object, ...] = ()) -> list[tuple[object, 
 PLACES = _places({key: value for key, value in DOCUMENT.items() if key != "asset"})
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=250, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_words_of_the_document_changed(tmp_path: Path, data: st.DataObject) -> None:
     """Wrong types, huge counts, rings, missing keys: in a JSON glTF with its buffer beside it."""
@@ -85,7 +85,7 @@ def test_words_of_the_document_changed(tmp_path: Path, data: st.DataObject) -> N
 HEADS = [b"", b"ply\nformat ascii 1.0\nend_header\n", b"OFF\n", b"solid facet\n", b"v 0 0 0\n", b"glTF", b"{"]
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     name=st.sampled_from(["m.obj", "m.ply", "m.stl", "m.off", "m.glb", "m.gltf"]),
     head=st.sampled_from(HEADS),
@@ -96,7 +96,7 @@ def test_noise(tmp_path: Path, name: str, head: bytes, noise: bytes) -> None:
 
 
 @pytest.mark.parametrize("name", ["m.obj", "m.ply", "m.off", "m.stl"])
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_mesh_files_changed_or_cut(tmp_path: Path, name: str, data: st.DataObject) -> None:
     import trimesh
@@ -117,7 +117,7 @@ SIDECAR_LINES = (
 )  # fmt: skip
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     lines=st.lists(
         st.sampled_from(SIDECAR_LINES),

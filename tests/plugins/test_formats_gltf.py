@@ -79,7 +79,7 @@ def triangle(document: Document, **attributes: int) -> dict[str, Any]:
     }
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 20), padding=st.integers(0, 3))
 def test_accessors_strided_normalised_sparse(
     tmp_path_factory: pytest.TempPathFactory, seed: int, count: int, padding: int
@@ -281,7 +281,7 @@ def test_a_buffer_beside_the_file_is_read_and_missed(tmp_path: Path) -> None:
     assert len(GltfFiles().read(path).mesh.faces) == 1
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_written_pose_stands_as_it_was(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
     """Random poses of a rig, and an object moved by its transform: read back, every vertex is in its place."""
@@ -345,7 +345,7 @@ def two_skins(bridge: np.ndarray, *, contradict: bool) -> Document:
     return document
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_skins_bound_in_spaces_of_their_own_come_together(
     tmp_path_factory: pytest.TempPathFactory, seed: int

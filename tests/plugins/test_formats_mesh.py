@@ -93,7 +93,7 @@ def test_n_gons_are_clipped_and_remembered(tmp_path: Path, name: str) -> None:
         assert set(np.flatnonzero(np.isin(asset.source_vertices, triangle))) <= set(faces[source])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_agrees_with_trimesh(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     """The same surface as an independent reader makes of an independent writer's file."""

@@ -29,7 +29,7 @@ WEBXR = [
 
 
 @given(order=st.permutations(WEBXR))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_flat_list_becomes_a_tree_whatever_its_order(order: list[str]) -> None:
     parents = tree_from_names(order)
     assert parents is not None and parents["wrist"] == ""
@@ -119,7 +119,7 @@ def right_angle_turns() -> st.SearchStrategy[np.ndarray]:
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     side=st.sampled_from(["left", "right"]),
     own=right_angle_turns(),

@@ -269,7 +269,7 @@ def test_a_name_that_no_file_can_have_is_refused_in_words() -> None:
         speaks_plainly(str(refusal.value))
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_changed_file_is_read_or_refused_in_words(tmp_path: Path, data: st.DataObject) -> None:
     """Mutants of every way of writing above: bytes changed, cut, moved, repeated, and hostile words put in."""

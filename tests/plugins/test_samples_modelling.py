@@ -18,7 +18,7 @@ def torus(p: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(np.hypot(p[:, 0], p[:, 2]) - 1.0, p[:, 1]) - 0.4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_round_cone_is_the_nearest_of_the_balls_along_it(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -31,7 +31,7 @@ def test_a_round_cone_is_the_nearest_of_the_balls_along_it(seed: int) -> None:
     assert np.allclose(fields.round_cone(a, b, ra, rb)(p), nearest, atol=2e-3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_slab_is_the_nearest_of_the_balls_over_its_triangle(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -107,7 +107,7 @@ def test_far_points_may_be_guessed_without_changing_the_surface() -> None:
     assert np.abs(np.linalg.norm(mesh.points - [0.1, 0, 0], axis=1) - 0.5).max() < 0.02
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_flips_and_collapses_keep_the_manifold(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -131,7 +131,7 @@ def test_a_thin_ring_is_never_pinched() -> None:
     assert facts.is_watertight and facts.genus == 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(x=st.floats(-0.4, 1.4), y=st.floats(-0.4, 1.4), height=st.floats(0.001, 0.5))
 def test_a_flip_never_doubles_an_edge(x: float, y: float, height: float) -> None:
     """In a tetrahedron each edge that a flip would make is there already, however flat it is."""

@@ -57,7 +57,7 @@ def test_the_camera_is_a_view(eye: Eye) -> None:
     assert eye.viewport == SIZE
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     x=st.floats(0, SIZE[0]), y=st.floats(0, SIZE[1]), far=st.floats(0.1, 50), dx=st.floats(-300, 300),
     dy=st.floats(-300, 300), side=st.sampled_from(["default", "front", "right", "top", "back", "left", "bottom"]),

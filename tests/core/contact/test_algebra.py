@@ -55,7 +55,7 @@ def off(mesh: TriangleMesh, a: SurfacePoints, b: SurfacePoints) -> float:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(seed=st.integers(0, 10**6), picks=st.integers(1, 4), dense=st.booleans())
 def test_taken_apart_and_put_together_it_is_the_same(family: str, seed: int, picks: int, dense: bool) -> None:
     """Un-mirrored transfer onto the same surface at the same root is the identity: 1e-9, slivers 1e-5."""
@@ -70,7 +70,7 @@ def test_taken_apart_and_put_together_it_is_the_same(family: str, seed: int, pic
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 10**6), which=st.floats(0.0, 1.0))
 def test_an_axis_can_be_held_by_any_of_its_points(family: str, seed: int, which: float) -> None:
     """Walking back from any axis point and its tangent finds the root."""
@@ -86,7 +86,7 @@ def test_an_axis_can_be_held_by_any_of_its_points(family: str, seed: int, which:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 10**6), mirrored=st.booleans())
 def test_a_link_leads_back_to_the_child(family: str, seed: int, mirrored: bool) -> None:
     mesh = cached_family(family)
@@ -104,7 +104,7 @@ def test_a_link_leads_back_to_the_child(family: str, seed: int, mirrored: bool) 
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 10**6), angle=st.floats(-3.0, 3.0), mirrored=st.booleans())
 def test_a_child_keeps_its_place_relative_to_a_parent_that_moved(
     family: str, seed: int, angle: float, mirrored: bool
@@ -183,7 +183,7 @@ def rigid(
 
 
 @pytest.mark.parametrize("surface", sorted(CLOSED))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), angle=st.floats(-3.0, 3.0))
 def test_rotation_is_rigid_where_the_surface_is_flat(surface: str, seed: int, angle: float) -> None:
     mesh, shape, root, points = setting(surface, seed)
@@ -197,7 +197,7 @@ def test_rotation_is_rigid_where_the_surface_is_flat(surface: str, seed: int, an
 
 
 @pytest.mark.parametrize("surface", sorted(CLOSED))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), target=st.integers(0, 29))
 def test_translation_is_rigid_where_the_surface_is_flat(surface: str, seed: int, target: int) -> None:
     mesh, shape, root, points = setting(surface, seed)
@@ -211,7 +211,7 @@ def test_translation_is_rigid_where_the_surface_is_flat(surface: str, seed: int,
 
 
 @pytest.mark.parametrize("surface", sorted(CLOSED))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), angle=st.floats(-1.0, 1.0), where=st.floats(0.0, 1.0))
 def test_a_bend_turns_the_part_behind_it_and_nothing_else(
     surface: str, seed: int, angle: float, where: float
@@ -231,7 +231,7 @@ def test_a_bend_turns_the_part_behind_it_and_nothing_else(
     assert np.abs(error).max() <= 1e-9
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), angle=st.floats(-3.0, 3.0), unit=st.sampled_from([1.0, 0.5, 2.0]))
 def test_transfer_from_plane_to_cylinder_is_the_mirror_image(seed: int, angle: float, unit: float) -> None:
     """Between surfaces that unroll into the plane a transfer is exactly a reflection, in the target's units."""
@@ -254,7 +254,7 @@ def test_transfer_from_plane_to_cylinder_is_the_mirror_image(seed: int, angle: f
     assert np.abs(unrolled(cylinder, placed.points)[ok] - wanted[ok]).max() <= 1e-9
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), along=st.floats(0.5, 1.5), spread=st.floats(0.5, 1.5))
 def test_along_and_spread_stretch_a_straight_patch_exactly(seed: int, along: float, spread: float) -> None:
     mesh, _, _, points = setting("plane", seed)
@@ -314,7 +314,7 @@ def test_edits_converge_on_refined_spheres(edit: str) -> None:
     assert order >= 1.0, f"errors {errors}, order {order:.2f}"
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 10**6))
 def test_points_bound_by_hand_are_where_they_were(seed: int) -> None:
     """Any anchors give the same points; the closest are only the default."""

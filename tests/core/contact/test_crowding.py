@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import contact_core as contact
 from contact_core.contact.crowding import crowded_points
 from contact_core.geometry.raycast import Locator
+from contact_core.geometry.thinning import meeting, spacing_of
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.view import Perspective
 from contact_core.testing import meshes
@@ -114,3 +115,12 @@ def test_two_balls_onto_one_thin_pole_are_told_where_they_meet(
         assert bool(caplog.records) is crowded
         for name in names.values():  # one by one they are well
             assert session.geometry.crowded([name]) == {name: 0.0}
+
+
+@given(st.integers(0, 1000), st.floats(0.01, 0.5), st.floats(0.01, 0.5))
+def test_points_that_meet_are_those_that_every_pair_tells(seed: int, near: float, apart: float) -> None:
+    random = np.random.default_rng(seed)
+    points, others = random.random((60, 3)) * random.random(3), random.random((60, 3))
+    gaps = [np.linalg.norm(each[:, None] - each[None], axis=2) for each in (points, others)]
+    assert (meeting(points, others, near, apart) == ((gaps[0] <= near) & (gaps[1] > apart)).any(axis=1)).all()
+    assert spacing_of(points, 60) == pytest.approx(np.median(np.sort(gaps[0], axis=1)[:, 1]))

@@ -17,7 +17,7 @@ from contact_core.testing.strategies import cached_family
 FAMILIES = ["plane", "saddle", "torus", "noisy", "holes"]
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.sampled_from(FAMILIES), st.integers(0, 2**32 - 1), st.lists(st.integers(0, 6), min_size=1, max_size=5))
 def test_batches_give_the_distances_of_all_points_at_once(name: str, seed: int, sizes: list[int]) -> None:
     """Against one search over the whole mesh; `changed` names exactly what was lowered."""

@@ -35,7 +35,7 @@ def read(parts: dict[str, str], digest: str) -> DocumentParts:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_a_walk_through_a_history_keeps_parts_and_digest(seed: int) -> None:
     """Changes applied one by one lead to the parts that the document has by itself, there and back."""
     history = random_history(seed, 10)
@@ -54,7 +54,7 @@ def test_a_walk_through_a_history_keeps_parts_and_digest(seed: int) -> None:
 
 
 @given(st.integers(0, 10_000), st.integers(0, 10_000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_digests_are_equal_exactly_for_equal_documents(one: int, other: int) -> None:
     a, b = random_document(one, 6), random_document(other, 6)
     same = dump_document(a) == dump_document(b)
@@ -64,7 +64,7 @@ def test_digests_are_equal_exactly_for_equal_documents(one: int, other: int) -> 
 
 
 @given(st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=60), st.integers(0, 100))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_any_host_can_keep_keys_and_texts(name: str, number: int) -> None:
     document = ContactDocument(extras=FrozenMap({name: name, "2": number, "none": None}))
     texts = texts_of(document)

@@ -36,7 +36,7 @@ from contact_core.errors import CommandRejected, EditedFile, FileRefused, Invali
 from contact_core.testing.random_commands import random_document
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10**6))
 def test_written_and_read_back_it_is_the_same_to_the_last_bit(seed: int) -> None:
     document = random_document(seed, 40)
@@ -52,7 +52,7 @@ def test_written_and_read_back_it_is_the_same_to_the_last_bit(seed: int) -> None
     assert dict(again.patches) == dict(document.patches)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6))
 def test_bytes_do_not_depend_on_the_order_of_making(seed: int) -> None:
     document = random_document(seed)
@@ -67,7 +67,7 @@ def test_bytes_do_not_depend_on_the_order_of_making(seed: int) -> None:
     assert dump_document(ContactDocument(**parts)) == dump_document(document)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6))
 def test_what_is_kept_of_the_text_changes_no_byte(seed: int) -> None:
     document = random_document(seed)
@@ -76,7 +76,7 @@ def test_what_is_kept_of_the_text_changes_no_byte(seed: int) -> None:
     assert dump_document(copy.deepcopy(document)) == dump_document(document)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6))
 def test_what_was_read_is_written_again_without_encoding_what_nobody_changed(seed: int) -> None:
     """The texts of its shapes are those of the file; a changed one is encoded, and no byte differs."""
@@ -131,7 +131,7 @@ def test_it_is_made_for_review() -> None:
     assert json.loads("\n".join(before))["schema"] == "contact-core.document"
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     data=st.recursive(
         st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -231,7 +231,7 @@ def test_finite_arrays_are_told_from_others(size: int) -> None:
             assert not all_finite(array) and not all_finite(array[::-1])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 50), data=st.data())
 def test_no_damaged_file_is_read_as_another_document(seed: int, data: st.DataObject) -> None:
     """Flips, holes, cuts and swaps: what is read in spite of them is what was written (white space was hit)."""
@@ -259,7 +259,7 @@ def test_no_damaged_file_is_read_as_another_document(seed: int, data: st.DataObj
         assert dump_document(found) == sound, (kind, start, length)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6))
 def test_the_digest_is_that_of_the_content_whatever_the_layout(seed: int) -> None:
     document = random_document(seed)
@@ -359,7 +359,7 @@ def test_what_is_missing_is_named_with_what_is_near() -> None:
         ContactDocument().patch("thumb")
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10**6), other=st.integers(0, 10**6))
 def test_documents_are_the_same_exactly_where_their_files_are(seed: int, other: int) -> None:
     a, b = random_document(seed), random_document(other)

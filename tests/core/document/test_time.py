@@ -52,7 +52,7 @@ def timed(seed: int) -> ContactDocument:
     return SetSpans("timed", (Span(10.0, 20.0, 4.0, 8.0),)).apply(document)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), frame=st.floats(-10.0, 60.0))
 def test_a_document_at_a_frame_is_a_sound_document_without_time(seed: int, frame: float) -> None:
     document = timed(seed)
@@ -64,7 +64,7 @@ def test_a_document_at_a_frame_is_a_sound_document_without_time(seed: int, frame
     assert set(still.patches) == set(document.patches) and still.shapes is document.shapes
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000))
 def test_values_are_exact_at_keys_and_held_beyond_the_ends(seed: int) -> None:
     document = timed(seed)

@@ -78,7 +78,7 @@ def test_drags_merge() -> None:
     }  # fmt: skip
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 10**6))
 def test_a_random_history_of_500_equals_its_replay(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -113,7 +113,7 @@ def test_a_random_history_of_500_equals_its_replay(seed: int) -> None:
     assert dump_document(parse_document(dump_document(history.document))) == dump_document(history.document)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6))
 def test_undo_and_redo_walk_through_the_very_same_documents(seed: int) -> None:
     history = random_history(seed, 40)
@@ -130,7 +130,7 @@ def test_undo_and_redo_walk_through_the_very_same_documents(seed: int) -> None:
         assert history.goto(revision) is forward[position]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6))
 def test_a_merged_drag_is_one_step_that_equals_all_of_it(seed: int) -> None:
     history = random_history(seed, 15)

@@ -69,7 +69,7 @@ def crashed(
     return path, session.document
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     kind=st.sampled_from(KINDS),
     where=st.floats(0.0, 1.0),
@@ -116,7 +116,7 @@ def _is_a_shorter_journal(raw: bytes, broken: bytes) -> bool:
     return raw.startswith(broken) and broken.endswith(b"\n")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10**6), data=st.data())
 def test_what_lies_before_and_after_a_lost_line_is_replayed(
     tmp_path_factory: pytest.TempPathFactory, seed: int, data: st.DataObject

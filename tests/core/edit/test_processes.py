@@ -97,7 +97,7 @@ os.kill(os.getpid(), 9)
 """
 
 
-@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=3, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(limit=st.integers(600, 20_000), size=st.integers(1, 3_000))
 @example(limit=600, size=3000)
 @example(limit=775, size=1)  # room for the document, none for the line that says that it is saved

@@ -46,7 +46,7 @@ def kept_beside(path: Path) -> list[bytes]:
     return [found.read_bytes() for found in path.parent.iterdir() if found.name.startswith(path.name)]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 10**6), position=st.floats(0.0, 1.0), backwards=st.integers(0, 4))
 @example(seed=3825, position=0.9375, backwards=1)
 def test_a_history_that_began_elsewhere_is_recovered_with_all_its_steps(

@@ -16,7 +16,7 @@ from contact_core.session import Session
 from contact_core.testing.random_commands import random_history
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10**6))
 def test_a_diff_is_empty_exactly_when_documents_are_equal(seed: int) -> None:
     for step in random_history(seed, 25, still=True).steps:

@@ -123,7 +123,7 @@ def test_editing_a_parent_carries_all_its_descendants(session: Session) -> None:
     assert np.allclose(np.array(before), np.array(after), atol=1e-12)
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(angle=st.floats(-2.0, 2.0), face=st.integers(0, 287))
 def test_a_tree_moves_rigidly_on_a_plane(angle: float, face: int) -> None:
     """Where the surface is flat, a whole tree turns and moves as one rigid body, branches and depth included."""

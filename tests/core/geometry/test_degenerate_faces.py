@@ -69,7 +69,7 @@ def names_a_place(refusal: ContactError) -> bool:
 
 
 @given(data=st.data(), name=family_names(without=("sliver",)), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_log_then_exp_across_edges_without_length(data: st.DataObject, name: str, seed: int) -> None:
     mesh = with_collapsed_edges(name, seed)
     sources, targets = data.draw(surface_points(mesh, 2)), data.draw(surface_points(mesh, 4))
@@ -97,7 +97,7 @@ def test_a_walk_along_a_face_without_area_meets_the_vertex_ahead(weights: list[f
 
 
 @given(data=st.data(), name=family_names(without=("sliver",)), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_log_then_exp_across_faces_whose_corners_lie_on_a_line(data: st.DataObject, name: str, seed: int) -> None:
     mesh = with_corners_slid_onto_edges(name, seed)
     assert (
@@ -106,7 +106,7 @@ def test_log_then_exp_across_faces_whose_corners_lie_on_a_line(data: st.DataObje
 
 
 @given(data=st.data(), name=family_names(), steps=st.integers(2, 8), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_laws_hold_on_collapsed_meshes_or_a_sentence_says_why_not(
     data: st.DataObject, name: str, steps: int, seed: int
 ) -> None:

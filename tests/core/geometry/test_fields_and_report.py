@@ -25,7 +25,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_distance_field_gradient_is_its_derivative(seed: int) -> None:
     field = DistanceField.of(cached_family("torus"), resolution=24)
     points = np.random.default_rng(seed).uniform(-2.0, 2.0, (60, 3))  # in the grid and outside of it
@@ -43,7 +43,7 @@ def test_distance_field_gradient_is_its_derivative(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_field_within_a_box_is_the_whole_one_there(seed: int) -> None:
     mesh = cached_family("torus")
     random = np.random.default_rng(seed)

@@ -41,7 +41,7 @@ def brute_force_distance(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
 
 
 @given(name=family_names(), seed=seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_closest_equals_brute_force(name: str, seed: int) -> None:
     mesh = cached_family(name)
     random = np.random.default_rng(seed)
@@ -54,7 +54,7 @@ def test_closest_equals_brute_force(name: str, seed: int) -> None:
 
 
 @given(data=st.data(), name=family_names())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_point_of_the_surface_is_its_own_closest(data: st.DataObject, name: str) -> None:
     mesh = cached_family(name)
     points = data.draw(surface_points(mesh, count=3))
@@ -72,7 +72,7 @@ def on_silhouette(mesh: TriangleMesh, point: SurfacePoints, ray: np.ndarray) -> 
 
 
 @given(data=st.data(), name=family_names(), seed=seeds)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_ray_to_a_surface_point_stops_there_or_before(data: st.DataObject, name: str, seed: int) -> None:
     mesh = cached_family(name)
     points = data.draw(surface_points(mesh, count=4))
@@ -103,7 +103,7 @@ def test_no_ray_from_inside_leaks_through_edges_or_vertices(name: str) -> None:
 
 
 @given(seed=seeds, name=st.sampled_from(CLOSED))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_winding_number_counts_and_its_tree_agrees_with_the_exact_sum(seed: int, name: str) -> None:
     mesh = cached_family(name)
     locator = Locator.of(mesh)

@@ -145,7 +145,7 @@ def test_midpoint_subdivision_changes_no_distance(name: str) -> None:
         assert np.abs(coarse.distance - finer.distance).max() <= 1e-12 * coarse.distance.max()
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.data(), family_names())
 def test_metric_axioms_and_chords(data: st.DataObject, name: str) -> None:
     mesh = cached_family(name)
@@ -159,7 +159,7 @@ def test_metric_axioms_and_chords(data: st.DataObject, name: str) -> None:
     assert (np.linalg.norm(positions[:, None] - positions[None], axis=2) <= d + 1e-12 * size).all()
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.data(), family_names())
 def test_the_way_back_is_the_way_there(data: st.DataObject, name: str) -> None:
     mesh = cached_family(name)
@@ -173,7 +173,7 @@ def test_the_way_back_is_the_way_there(data: st.DataObject, name: str) -> None:
     assert same_way or np.linalg.norm(end.points.positions(mesh) - points[0].positions(mesh)) <= 1e-9  # a tie
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data(), family_names(), headings(), st.floats(0.01, 0.8))
 def test_no_walk_is_shorter_than_the_distance(
     data: st.DataObject, name: str, heading: complex, length: float
@@ -209,7 +209,7 @@ def test_a_bound_hides_what_is_farther_and_changes_nothing_else(name: str) -> No
     assert held.pops < free.pops
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.data(), family_names(without=("plane", "cylinder", "creased")), st.integers(0, 2**32 - 1))
 def test_rigid_motion_and_relabelling_change_nothing(data: st.DataObject, name: str, seed: int) -> None:
     mesh = cached_family(name)
@@ -260,7 +260,7 @@ def test_distances_on_finer_spheres_converge_with_second_order() -> None:
     assert errors[0] > errors[1] > errors[2]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data(), family_names())
 def test_exact_geodesic_is_a_path_of_its_length(data: st.DataObject, name: str) -> None:
     mesh = cached_family(name)
@@ -274,7 +274,7 @@ def test_exact_geodesic_is_a_path_of_its_length(data: st.DataObject, name: str) 
     assert (path.points.barycentric[1:-1].min(axis=1) <= 1e-15).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data(), family_names(), headings(), headings())
 def test_transport_keeps_lengths_and_angles_and_comes_back(
     data: st.DataObject, name: str, one: complex, other: complex

@@ -34,7 +34,7 @@ def agrees(mesh: TriangleMesh, sources: SurfacePoints, target: SurfacePoints) ->
     return log.pops, full.pops
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.data(), family_names(), st.integers(1, 3))
 def test_the_distance_is_that_of_a_full_search(data: st.DataObject, name: str, count: int) -> None:
     mesh = cached_family(name)
@@ -50,7 +50,7 @@ def test_among_paths_of_one_length_a_shortest_is_found(kind: str) -> None:
             agrees(mesh, special_points(mesh, 1 + 2 * (k % 2), random), special_points(mesh, 1, random))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data(), family_names(), st.floats(0.3, 1.7))
 def test_a_limit_is_one_for_it_too(data: st.DataObject, name: str, share: float) -> None:
     mesh = cached_family(name)

@@ -45,7 +45,7 @@ def same_surface(ours: TriangleMesh, original: TriangleMesh) -> None:
         assert one.volume is not None and np.isclose(one.volume, other.volume)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(name=family_names(), seed=st.integers(0, 2**32 - 1))
 def test_a_soup_of_a_manifold_mesh_becomes_that_mesh(name: str, seed: int) -> None:
     mesh = cached_family(name)
@@ -55,7 +55,7 @@ def test_a_soup_of_a_manifold_mesh_becomes_that_mesh(name: str, seed: int) -> No
     same_surface(ours, mesh)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     cells=st.integers(1, 2**18 - 1), seed=st.integers(0, 2**32 - 1), split=st.floats(0.0, 1.0), exact=st.booleans()
 )
@@ -83,7 +83,7 @@ def test_joining_never_makes_a_manifold_mesh_non_manifold(cells: int, seed: int,
         assert np.isclose(after.area, before.area)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(seed=st.integers(0, 2**32 - 1), spots=st.integers(3, 7), count=st.integers(1, 24))
 def test_nothing_gets_worse_in_any_heap_of_triangles(seed: int, spots: int, count: int) -> None:
     """Random triangles over few places: every kind of crowded edge and vertex, all at once."""
@@ -104,7 +104,7 @@ def test_nothing_gets_worse_in_any_heap_of_triangles(seed: int, spots: int, coun
             assert report(made_sound(ours.points, ours.faces)[0]).is_manifold
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(name=family_names(), seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.49), loose=st.booleans())
 def test_mixed_winding_is_made_consistent(name: str, seed: int, share: float, loose: bool) -> None:
     mesh = cached_family(name)
@@ -254,7 +254,7 @@ def test_copies_that_float32_rounded_apart_are_joined(place: float) -> None:
     assert report(ours).is_watertight and len(ours.points) == len(mesh.points)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     name=st.sampled_from(["sphere", "torus", "noisy", "plane", "holes"]),
@@ -316,7 +316,6 @@ def test_points_of_different_labels_stay_apart() -> None:
     assert report(made_sound(points, faces, apart=own)[0]).components == 2
 
 
-@settings(deadline=None)
 @given(st.integers(1, 30), st.lists(st.tuples(st.integers(0, 29), st.integers(0, 29)), max_size=60))
 def test_pieces_are_those_of_a_graph(faces: int, joined: list[tuple[int, int]]) -> None:
     from scipy.sparse import coo_array

@@ -15,7 +15,7 @@ from contact_core.testing.strategies import cached_family, family_names, heading
 OPEN = ("plane", "cylinder", "holes", "creased", "saddle", "sliver", "lattice")  # headings at a rim may leave them
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data(), family_names(without=OPEN), headings())
 def test_heading_to_direction_and_back(data: st.DataObject, name: str, heading: complex) -> None:
     mesh = cached_family(name)
@@ -42,7 +42,7 @@ def test_a_direction_hardly_beside_an_edge_keeps_its_angle(name: str, beside: fl
         assert np.abs(found - wanted).max() <= 1e-12
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data(), family_names(), headings())
 def test_direction_is_where_the_walk_goes(data: st.DataObject, name: str, heading: complex) -> None:
     mesh = cached_family(name)

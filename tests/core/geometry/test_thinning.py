@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
@@ -40,7 +40,6 @@ def test_on_every_family_the_choice_is_that_of_the_definition(name: str, share: 
     np.testing.assert_array_equal(first_of_each(at, apart), by_definition(at, apart))
 
 
-@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(0, 300),
@@ -60,7 +59,6 @@ def test_on_random_points_the_choice_is_that_of_the_definition(
     np.testing.assert_array_equal(first_of_each(at, apart), by_definition(at, apart))
 
 
-@settings(deadline=None)
 @given(st.integers(1, 6), st.integers(0, 2**16))
 def test_on_a_lattice_points_exactly_apart_are_too_near(steps: int, seed: int) -> None:
     """Powers of two, so that distances are exact and ties happen at every point."""

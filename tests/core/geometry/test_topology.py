@@ -115,7 +115,7 @@ def test_a_face_without_area_is_crossed_like_the_line_that_it_is(overhang: float
     assert np.abs(end.points.positions(mesh) - targets.positions(mesh)).max() <= 1e-10
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(st.integers(0, 2**32 - 1))
 def test_soups_of_triangles_answer_or_say_why_not(seed: int) -> None:
     """Points on a coarse lattice and random faces: doubled points, flat faces, fins, bow ties, several parts."""

@@ -15,7 +15,7 @@ from contact_core.testing.strategies import cached_family, family_names, heading
 LENGTHS = st.floats(1e-6, 1.5)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data(), family_names(), headings(), LENGTHS)
 def test_forward_then_reverse_closes(data: st.DataObject, name: str, heading: complex, length: float) -> None:
     mesh = cached_family(name)
@@ -29,7 +29,7 @@ def test_forward_then_reverse_closes(data: st.DataObject, name: str, heading: co
         assert abs(back.headings[0] + heading) <= 1e-9
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data(), family_names(), headings(), LENGTHS)
 def test_chord_is_no_longer_than_walk(data: st.DataObject, name: str, heading: complex, length: float) -> None:
     mesh = cached_family(name)
@@ -39,7 +39,7 @@ def test_chord_is_no_longer_than_walk(data: st.DataObject, name: str, heading: c
     assert chord <= length - end.remaining[0] + 1e-11 * mesh.bounding_box_diagonal
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data(), family_names(), headings(), LENGTHS, st.floats(0.0, 1.0))
 def test_two_steps_are_one(
     data: st.DataObject, name: str, heading: complex, length: float, fraction: float
@@ -55,7 +55,7 @@ def test_two_steps_are_one(
     assert gap <= 1e-9 * mesh.bounding_box_diagonal
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data(), headings(), LENGTHS)
 def test_on_a_plane_a_trace_is_a_straight_line(data: st.DataObject, heading: complex, length: float) -> None:
     mesh = cached_family("plane")
@@ -70,7 +70,7 @@ def test_on_a_plane_a_trace_is_a_straight_line(data: st.DataObject, heading: com
         assert min(*expected[:2], *(1.0 - expected[:2])) <= 1e-9  # it stopped at the rim
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data(), family_names(), headings(), LENGTHS)
 def test_polyline_is_the_walk(data: st.DataObject, name: str, heading: complex, length: float) -> None:
     mesh = cached_family(name)

@@ -23,7 +23,7 @@ def vector_area(polygon: np.ndarray) -> np.ndarray:
     return 0.5 * np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(seed=st.integers(0, 2**32 - 1), corners=st.integers(3, 24))
 def test_triangles_cover_a_simple_polygon_once(seed: int, corners: int) -> None:
     points = star_polygon(seed, corners)
@@ -47,7 +47,6 @@ def test_the_concave_pentagon_that_a_fan_gets_wrong() -> None:
     assert np.isclose(areas.sum(), 10.0)
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_shared_edges_stay_shared(seed: int) -> None:
     """A closed polyhedron of n-gons stays closed: every directed edge meets its reverse once."""

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from contact_core.geometry.weld import close_points
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), distinct=st.integers(1, 30), copies=st.integers(1, 4))
 def test_copies_within_reach_become_one(seed: int, distinct: int, copies: int) -> None:
     random = np.random.default_rng(seed)
@@ -23,7 +22,6 @@ def test_copies_within_reach_become_one(seed: int, distinct: int, copies: int) -
     assert (np.diff(firsts) > 0).all()  # in the order of first appearance
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_each_point_reaches_as_far_as_it_may(seed: int) -> None:
     """Against all pairs, with reaches over many magnitudes."""

@@ -111,7 +111,7 @@ def test_built_in_hands_give_back_their_design(sample: object, nameless: bool) -
 @given(
     seed=st.integers(0, 2**32 - 1), mirrored=st.booleans(), sample=st.sampled_from(HANDS), nameless=st.booleans()
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_hand_that_is_moved_or_mirrored_is_the_same_hand(
     seed: int, mirrored: bool, sample: object, nameless: bool
 ) -> None:

@@ -71,7 +71,7 @@ def test_three_hundred_steps_of_core_host_and_user_agree() -> None:
 
 
 @given(st.floats(0.0, 1.0))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_between_keys_joints_turn_evenly_along_the_shortest_way(t: float) -> None:
     host = arm_host()
     rig = arm_rig()
@@ -111,7 +111,7 @@ def test_everything_survives_the_file(tmp_path: Path) -> None:
 
 
 @given(st.integers(0, 2**31), st.integers(1, 30))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_files_with_changed_bytes_are_read_or_refused(seed: int, count: int) -> None:
     path = _saved_file()
     data = bytearray(path.read_bytes())
@@ -146,7 +146,7 @@ mirrored_scales = st.sampled_from([(1.5, 1.5, 1.5), (-1.5, 1.5, 1.5), (0.5, 0.5,
 
 
 @given(mirrored_scales, st.tuples(*3 * [st.floats(-3, 3)]), st.integers(0, 5))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_scaled_or_mirrored_rig_moves_as_its_object_does(scale, angles, seed) -> None:  # type: ignore[no-untyped-def]
     """Posing in surface space and placing gives what posing in local space and transforming gives."""
     rig = arm_rig()

@@ -98,7 +98,7 @@ def check(artist: Artist) -> None:
 HANDLED = [0]
 
 
-@settings(max_examples=STREAMS, deadline=None)
+@settings(max_examples=STREAMS)
 @given(st.integers(0, 2**32 - 1))
 def test_random_events(seed: int) -> None:
     artist, monkey = paired(), Monkey(seed)

@@ -66,7 +66,7 @@ def test_without_contacts_nothing_moves() -> None:
     assert held.shape == away.shape
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(n=st.integers(1, 8), seed=st.integers(0, 1000))
 def test_smoothness_is_the_integral_of_squared_accelerations(n: int, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -51,7 +51,7 @@ def place(mesh: TriangleMesh, root: Root) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("name", SURFACES)
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_a_walk_arrives_where_the_next_key_is_with_its_heading(name: str, seed: int) -> None:
     mesh = meshes.family(name)
     keys = keys_on(mesh, seed, "linear", "smooth")

@@ -48,7 +48,7 @@ def rule_holds(rig: Rig, pose: Pose, ratio: float, other: float) -> None:
     assert all(LOWER - 1e-9 <= angle <= UPPER + 1e-9 for angle in angles)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.integers(0, 1000))
 def test_gradients_and_gauss_newton_know_the_coupling(ratio: float, other: float, seed: int) -> None:
     rig = coupled_rig(ratio, other)
@@ -70,7 +70,7 @@ def test_gradients_and_gauss_newton_know_the_coupling(ratio: float, other: float
         assert np.allclose(jacobian[:, :, q], moved, atol=1e-6 * np.abs(jacobian).max())
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.sampled_from([(0.7, -1.4), (1.0, 1.0), (2.5, 0.0), (-0.5, -3.0)]), st.integers(0, 1000))
 def test_a_solved_pose_keeps_the_rule_and_the_limits_of_both(ratios: tuple[float, float], seed: int) -> None:
     rig = coupled_rig(*ratios)

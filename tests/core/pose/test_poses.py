@@ -30,7 +30,7 @@ def random_pose(seed: int, rig: Rig = HAND) -> Pose:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_chart_goes_round(seed: int) -> None:
     """theta -> pose -> theta is the identity for angles below half a turn, of every kind of joint."""
     theta = np.clip(np.random.default_rng(seed).uniform(-1.4, 1.4, CHART.size), CHART.lower, CHART.upper)
@@ -40,7 +40,7 @@ def test_chart_goes_round(seed: int) -> None:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_any_pose_goes_through_the_chart_unchanged(seed: int) -> None:
     """Also one with scales, shears and turns that no freedom has."""
     local = HAND.rest_local @ np.random.default_rng(seed).normal(np.eye(4), 0.1, (len(HAND.joints), 4, 4))
@@ -77,7 +77,7 @@ def test_set_angles_sets_what_it_names() -> None:
 
 
 @given(st.integers(0, 1000), st.floats(0.0, 1.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_blend_runs_evenly_from_one_to_the_other(seed: int, share: float) -> None:
     one, two = random_pose(seed), random_pose(seed + 1)
     assert np.abs(blend(HAND, one, two, 0.0).local - one.local).max() < 1e-9
@@ -107,7 +107,7 @@ def two_hands() -> Rig:
 
 
 @given(st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_mirror_mirrors_the_skin(seed: int) -> None:
     """The skin of the mirrored pose is the mirror image of the skin, and mirroring twice changes nothing."""
     rig = two_hands()

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from contact_core.geometry.mesh import TriangleMesh
@@ -20,7 +20,6 @@ from contact_core.testing import meshes, rigs
 from contact_core.testing.strategies import cached_family, family_names
 
 
-@settings(deadline=None)  # the first call imports scipy.sparse
 @given(family_names(), st.integers(0, 2**32 - 1), st.integers(0, 40))
 def test_normals_at_vertices_are_the_normals_of_the_mesh(name: str, seed: int, count: int) -> None:
     """Whatever vertices, also some twice; also after the mesh has computed them all."""

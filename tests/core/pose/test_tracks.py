@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from contact_core.errors import InvalidInput
@@ -30,7 +30,6 @@ def dense(track: Track) -> np.ndarray:
 seeds = st.integers(0, 2**32 - 1)
 
 
-@settings(deadline=None)  # kernels are compiled
 @given(seeds, st.integers(1, 9), st.sampled_from([3, 4]))
 def test_products_are_those_of_the_dense_matrix(seed: int, rows: int, width: int) -> None:
     random = np.random.default_rng(seed)
@@ -48,7 +47,6 @@ def test_products_are_those_of_the_dense_matrix(seed: int, rows: int, width: int
     assert track.gram(weights).matrix == pytest.approx(own.T @ (weights[:, None] * own))
 
 
-@settings(deadline=None)  # kernels are compiled
 @given(seeds, st.integers(1, 9), st.sampled_from([3, 4]))
 def test_tracks_are_made_of_tracks_as_matrices_of_matrices(seed: int, rows: int, width: int) -> None:
     random = np.random.default_rng(seed)
@@ -67,7 +65,6 @@ def test_tracks_are_made_of_tracks_as_matrices_of_matrices(seed: int, rows: int,
     )
 
 
-@settings(deadline=None)  # kernels are compiled
 @given(seeds)
 def test_entries_of_one_bone_in_one_row_are_one(seed: int) -> None:
     random = np.random.default_rng(seed)
