@@ -23,7 +23,6 @@ DIRECTIONS = 96
 ROUND = (
     0.1  # by how much normals vary more across a thing than along it, as mean squares, where it is round for sure
 )
-LOOP_REACH = 0.3  # hand lengths from the place that is to be held to a finger through the loop there
 BACK = (0.06, 0.12, 0.2, 0.3)  # hand lengths of the way back out
 
 
@@ -156,27 +155,6 @@ def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray
     return float(np.median(angles)) if angles else 0.0
 
 
-def through_loops(
-    hand: Hand,
-    frames: FloatArray,
-    field: DistanceField,
-    solid: DistanceField,
-    at: FloatArray,
-    reach: float | None = None,
-) -> BoolArray:
-    """(N, D) which digits reach into a hollow near a place: bones in what is filled of the object (`filled`) and is
-    not it, as a finger through a handle is. frames: (N, B, 4, 4) of bones in the object's space; at: (3,). reach:
-    from the place to the bone, `LOOP_REACH` of the hand by default."""
-    ends = np.einsum("nbij,bej->nbei", frames[:, :, :3, :3], hand.capsules) + frames[:, :, None, :3, 3]
-    points = np.stack([ends[:, :, 0], ends.mean(axis=2), ends[:, :, 1]], axis=2)  # (N, B, 3, 3)
-    flat = points.reshape(-1, 3)
-    near = np.linalg.norm(flat - at, axis=1) < (LOOP_REACH * hand.length if reach is None else reach)
-    inside = near.copy()
-    inside[near] = (field.distances(flat[near]) > 0.0) & (solid.distances(flat[near]) < 0.0)
-    by_bone = inside.reshape(points.shape[:3]).any(axis=2) & hand.flexes
-    return np.asarray(np.logical_or.reduceat(by_bone, hand.bones[:-1], axis=1))
-
-
 def crossing(hand: Hand, world: FloatArray) -> float:
     """How far bones of different digits are in one another, at most, as a share of how near they may come (their
     capsules' radii, or how near they are at rest). world: (j, 4, 4) object_from_joint."""
@@ -192,11 +170,15 @@ def crossing(hand: Hand, world: FloatArray) -> float:
     return float(max((1.0 - apart / hand.room[first, second]).max(), 0.0))
 
 
-def uneven_curl(hand: Hand, angles: FloatArray, used: BoolArray) -> float:
-    """The largest difference between neighbouring fingers' bends in all, radians, of the fingers that take part."""
+def uneven_curl(hand: Hand, angles: FloatArray, used: BoolArray, through: BoolArray | None = None) -> float:
+    """The largest difference between neighbouring fingers' bends in all, radians, of the fingers that take part.
+    through: (D,) which go through a loop; where the end of a handle is between two fingers half of it counts."""
     total = hand.turned(angles)
     fingers = [d for d in range(len(total)) if d != hand.thumb and used[d]]
-    return float(np.abs(np.diff(total[fingers])).max(initial=0.0)) if len(fingers) > 1 else 0.0
+    apart = np.abs(np.diff(total[fingers]))
+    if through is not None:
+        apart = np.where(np.diff(through[fingers]), 0.5 * apart, apart)
+    return float(apart.max(initial=0.0))
 
 
 def comfort(hand: Hand, angles: FloatArray) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -24,10 +25,11 @@ from contact_core.grasping.facts import (
     digits_in_contact,
     opposition,
     skin_through,
-    through_loops,
     thumb_along,
     uneven_curl,
 )
+from contact_core.grasping.hand import Hand
+from contact_core.grasping.loops import digits_through
 from contact_core.grasping.metrics import measure
 from contact_core.grasping.posed_scene import posed_scene_in
 from contact_core.grasping.scene import GraspScene, hand_share
@@ -182,18 +184,18 @@ def judged(
     )
     posed, metrics = looked_at.skin, measure(looked_at)
     touching = digits_in_contact(hand, posed.points, Locator.of(scene.mesh))
-    angles = hand.angles_of(pose)
+    angles, (through,) = hand.angles_of(pose), digits_through(hand, world[hand.joints][None], scene.loops)
+    metrics |= _through(hand, through)
     metrics |= {
         "pads_placed": (wanted - len(left_out)) / max(wanted, 1),
         "digits_in_contact": int((touching & used).sum()),
         "digits_wanted": int(used.sum()),
         "thumb_in_contact": bool(hand.thumb < 0 or not used[hand.thumb] or touching[hand.thumb]),
         "skin_through": float(skin_through(hand, posed.points, world, scene.mesh).max()) / hand.length,
-        "uneven_curl_deg": float(np.degrees(uneven_curl(hand, angles, used & touching))),
+        "uneven_curl_deg": float(np.degrees(uneven_curl(hand, angles, used & touching, through.any(axis=0)))),
         "opposition_deg": float(np.degrees(opposition(hand, posed.points, scene.mesh, used))),
         "thumb_along": thumb_along(hand, posed.points, world, scene.mesh),
         "crossing": crossing(hand, world),
-        "digits_through": _digits_through(scene, world),
         "closure": closure(contact_wrenches(posed, scene.mesh, hand.length)),
     }
     verdict = judge(metrics, {} if proposed else left_out, {})
@@ -215,9 +217,11 @@ def judged(
     return Suggestion(proposal, kind, facts, verdict, float(score.score(facts)), left_out, posed, placed, way, seen)
 
 
-def _digits_through(scene: GraspScene, world: FloatArray) -> int:
-    """How many digits go through a loop at the place that was to be held; none where no place was named."""
-    if scene.at is None:
-        return 0
-    frames = world[scene.hand.joints][None]
-    return int(through_loops(scene.hand, frames, scene.field, scene.solid, scene.at).sum())
+def _through(hand: Hand, through: BoolArray) -> dict[str, Any]:
+    """Metrics of what goes through loops at the place that was to be held. through: (L, D) which digits do."""
+    roles = [hand.digits[d].role for d in np.flatnonzero(through.any(axis=0))]
+    return {
+        "digits_through": len(roles),
+        "through_loop": roles,
+        "loops_held": int(through.any(axis=1).sum()),
+    }

@@ -15,6 +15,7 @@ from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.grasping.filled import KeepOutTerm, filled
 from contact_core.grasping.hand import Hand
+from contact_core.grasping.loops import Loop, loops_near
 from contact_core.plugins.registry import POSE_TERMS
 from contact_core.proposals.proposal import AGAIN, SolveSettings
 from contact_core.rig.rig import Pose
@@ -99,6 +100,11 @@ class GraspScene:
     def solid(self) -> DistanceField:
         """The object with its hollows filled (`filled`)."""
         return self.filled(self.field)
+
+    @cached_property
+    def loops(self) -> tuple[Loop, ...]:
+        """Those at the place that is to be held, the nearest first."""
+        return loops_near(self.mesh, self.hand.length, self.at)
 
     def filled(self, field: DistanceField) -> DistanceField:
         """A field of the object with the hollows filled that no ball of a fifth of the hand reaches into."""

@@ -12,8 +12,8 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.grasping.closing import Closed, close_hands, relaxed
-from contact_core.grasping.facts import through_loops
 from contact_core.grasping.hand import Hand
+from contact_core.grasping.loops import digits_through
 from contact_core.grasping.scene import GraspScene, uniform_scale_of
 from contact_core.grasping.screening import distinct, elsewhere, first_look, seen_from
 from contact_core.grasping.slots import KINDS, Approaches, GraspRequest, Kind, lacks
@@ -23,8 +23,9 @@ from contact_core.progress import NO_PROGRESS, Progress
 SECOND_LOOK = 220  # approaches that are closed with all starts of the thumb
 MORE = {"power": 3.0}  # times as many approaches of a kind as of others
 TURNS = ("power", "power", "precision", "power", "pinch", "power", "hook")  # one after the other
-BOTH = 0.8  # what it is worth that the thumb is through one, too
+BOTH = 0.8  # what it is worth that the thumb is through one loop and a finger through another
 THREADED = 0.3  # what each finger through a loop at the place to hold is worth to a first look
+BESIDE = 0.6  # what it costs that the thumb is through the same
 WORSE, HOPELESS = 1.1, -0.6  # a first look that is worse than the best by so much, and below that, is not tried
 USUAL: tuple[Kind, ...] = ("power", "precision", "pinch", "hook")
 
@@ -96,13 +97,17 @@ def _looked_at(scene: GraspScene, approaches: Approaches, closed: Closed, at: Fl
 
 def _threaded(scene: GraspScene, closed: Closed) -> FloatArray:
     """(N,) what fingers through a loop at the place that is to be held are worth; nothing without a place."""
-    if scene.at is None:
+    if not scene.loops:
         return np.zeros(len(closed.placed))
     frames = scene.hand.frames(closed.placed, closed.angles, closed.turns)
-    through = through_loops(scene.hand, frames, scene.field, scene.solid, scene.at)
-    thumb = scene.hand.thumb
-    both = through[:, thumb] & (through.sum(axis=1) > 1) if thumb >= 0 else np.zeros(len(through), bool)
-    return np.asarray(THREADED * np.minimum(through.sum(axis=1), 4) + BOTH * both)
+    through, thumb = digits_through(scene.hand, frames, scene.loops), scene.hand.thumb
+    fingers = np.delete(through, thumb, axis=2) if thumb >= 0 else through
+    value = THREADED * np.minimum(fingers.any(axis=1).sum(axis=1), 4)
+    if thumb >= 0:
+        alone = through[:, :, thumb] & ~fingers.any(axis=2)
+        beside = through[:, :, thumb] & fingers.any(axis=2)
+        value += BOTH * (alone.any(axis=1) & fingers.any(axis=(1, 2))) - BESIDE * beside.any(axis=1)
+    return np.asarray(value)
 
 
 def _closed(hand: Hand, field: DistanceField, approaches: Approaches) -> Closed:

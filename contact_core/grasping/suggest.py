@@ -25,6 +25,7 @@ from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.draft import Draft
 
 MOST_TRIED = 3  # times as many as are wanted are solved at most
+LIES = 0.02  # hand lengths: a pad of the closed hand that is nearer lies on a bar
 REACHED = 0.5  # hand lengths: a place to hold that is farther from the object is none of its
 
 
@@ -95,6 +96,8 @@ def _finished(
     start = hand.pose(in_rig, closed.angles[0], closed.turns[0])
     draft.surfaces.set_pose(scene.hand_name, start)
     wanted = _taking_part(scene, approach, pads)
+    if scene.loops and approach.bars[0, 6] > 0.0:
+        wanted = _on_a_bar(scene, closed, wanted)
     return finished(scene, draft, wanted, proposed, approach.kinds[0], approach.used(hand)[0], score)
 
 
@@ -115,3 +118,15 @@ def _taking_part(scene: GraspScene, approach: Approaches, pads: tuple[str, ...])
         return bool(used[digit]) and not (kind == "lateral" and digit == hand.first_finger)
 
     return tuple(name for name in pads if counts(name))
+
+
+def _on_a_bar(scene: GraspScene, closed: Closed, pads: tuple[str, ...]) -> tuple[str, ...]:
+    """Of those pads the nearest of each digit, and what lies on the object as well: a handle is no longer across
+    than one bone, and a finger that goes round it cannot touch it with all."""
+    hand = scene.hand
+    owner = {pad.name: int(b) for pad in hand.description.pads for b in np.flatnonzero(hand.joints == pad.joint)}
+    away = np.abs(closed.fits[0, :, 0]) / hand.length
+    own = {name: owner[name] for name in pads if name in owner and hand.has_pad[owner[name]]}
+    digits = {name: int(np.searchsorted(hand.bones, b, side="right")) for name, b in own.items()}
+    least = {d: min(away[own[name]] for name in own if digits[name] == d) for d in digits.values()}
+    return tuple(name for name in pads if name not in own or away[own[name]] <= max(least[digits[name]], LIES))

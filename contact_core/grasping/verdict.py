@@ -56,7 +56,9 @@ DEFINITIONS = {
     "opposition_deg": "median over the fingers of the angle from which each presses against thumb and palm",
     "thumb_along": "how much the thumb points along what the fingers go round, 0 to 1; 0 on a ball or a plate",
     "crossing": "how far bones of two digits are in one another, as a share of how near they may come",
-    "digits_through": "digits through a loop at the place that was to be held",
+    "digits_through": "how many digits go through a loop at the place that was to be held",
+    "through_loop": "which: their centre lines cross a disk across the loop more often one way than the other",
+    "loops_held": "how many loops there have digits through them, two where scissors are held by both",
     "skin_through": "how far a digit's skin is beyond a wall between it and its bone, a fraction of the length",
     "closure": "Ferrari and Canny's measure of force closure; below 0 the contacts do not hold",
     "start_distance": "closest distance of the open hand to the object before the solve",
@@ -108,6 +110,7 @@ DIGITS = {"power": 3, "precision": 3, "hook": 2, "lateral": 2, "pinch": 2}
 CLOSURE = {"power": 0.02, "precision": 0.01, "pinch": 0.0, "hook": -np.inf, "lateral": -np.inf}
 PADS_PLACED = {"power": 0.5, "precision": 0.6, "pinch": 0.6, "hook": 0.4, "lateral": 0.5}
 OPPOSED = {"power": 100.0, "precision": 100.0, "pinch": 110.0, "lateral": 80.0, "hook": -np.inf}  # degrees
+CAGED = 2  # digits through a loop: what they go round is held by its shape, and wants no friction
 SKIN_THROUGH = 0.025
 UNEVEN = 65.0  # degrees
 CLEAR, LEAST_SCALE = 0.06, 0.05  # of a limit: what is farther from it is clear of it; what a limit counts at least
@@ -125,7 +128,7 @@ def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
     if metrics["pads_placed"] < PADS_PLACED[kind]:
         share = f"{100 * metrics['pads_placed']:.0f} % of the pads"
         failures.append(f"only {share} found a place, a {kind} grasp wants {100 * PADS_PLACED[kind]:.0f} %")
-    if metrics["closure"] < CLOSURE[kind]:
+    if metrics["closure"] < _least_closure(metrics, kind):
         failures.append("the contacts do not hold the object: it would slip or turn out of the hand")
     if metrics["opposition_deg"] < OPPOSED[kind]:
         failures.append(
@@ -144,13 +147,18 @@ def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
     return tuple(failures)
 
 
+def _least_closure(metrics: Mapping[str, Any], kind: str) -> float:
+    """Fingers through a loop cannot lose it, however slippery it is."""
+    return -np.inf if metrics.get("digits_through", 0) >= CAGED else CLOSURE[kind]
+
+
 def margin(metrics: Mapping[str, Any], kind: str) -> float:
     """0 to 1: how far a grasp of a kind that passes is from the limit nearest to it, as a share of that limit,
     and 1 from `CLEAR` on; 0 at a limit or beyond. Counts have no margin. The last bits of a processor decide
     the verdict of a grasp that has none."""
     limits = [(metrics.get(key), sign, limit) for key, (sign, limit) in ACCEPT.items()]
     limits += [
-        (metrics.get("closure"), ">=", CLOSURE[kind]),
+        (metrics.get("closure"), ">=", _least_closure(metrics, kind)),
         (metrics.get("opposition_deg"), ">=", OPPOSED[kind]),
         (metrics.get("crossing"), "<=", CROSSING),
         (metrics.get("skin_through"), "<=", SKIN_THROUGH),

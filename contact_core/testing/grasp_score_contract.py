@@ -36,6 +36,8 @@ GOOD: dict[str, Any] = {
     "thumb_along": 0.0,
     "crossing": 0.0,
     "digits_through": 0,
+    "through_loop": [],
+    "loops_held": 0,
     "closure": 0.1,
 }
 

@@ -21,7 +21,12 @@ class Balanced(HasSettings):
     contact: float = setting(1.0, low=0.0, help="what close contact of many pads counts")
     hold: float = setting(1.0, low=0.0, help="what digits that touch and closure count")
     comfort: float = setting(0.7, low=0.0, help="what joints in the middle of their room and like bends count")
-    loop: float = setting(0.25, low=0.0, help="what each finger through the loop at the place to hold counts")
+    loop: float = setting(
+        0.25,
+        low=0.0,
+        help="what each finger through a loop to hold counts, and a thumb beside it costs",
+    )
+    scissors: float = setting(0.5, low=0.0, help="what the thumb through one loop and a finger in another count")
     along: float = setting(0.7, low=0.0, help="what a thumb costs that lies along what the fingers go round")
     margin: float = setting(0.3, low=0.0, help="what it costs that the verdict hangs on a limit")
     clearance: float = setting(0.3, low=0.0, help="what a free way out counts")
@@ -32,10 +37,13 @@ class Balanced(HasSettings):
         contact = m["pads_placed"] * (1.0 - 0.5 * far) * (m["opposed_normals_45"] or 0.0)
         digits = m["digits_in_contact"] / max(m["digits_wanted"], 1)
         hold = 0.5 * digits + 0.5 * min(max(facts.closure, 0.0) / FIRM, 1.0)
+        thumb = "thumb" in m["through_loop"]
         value = self.contact * contact + self.hold * hold + self.comfort * facts.comfort
-        if facts.kind not in ("pinch", "lateral"):
+        if facts.kind not in ("pinch", "lateral") and not thumb:  # its loop says where it goes
             value -= self.along * m["thumb_along"]
         if not facts.failures:
             value -= self.margin * (1.0 - facts.margin)
-        value += self.loop * min(m["digits_through"], 4)
+        value += self.loop * min(m["digits_through"] - thumb, 4)
+        if thumb:  # as scissors are held, or in the way of the fingers
+            value += self.scissors if m["loops_held"] > 1 else -self.loop
         return float(value + self.clearance * facts.clearance - FAILURE * len(facts.failures))

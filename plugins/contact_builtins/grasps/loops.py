@@ -1,63 +1,137 @@
-"""Thumb and fingers through two loops, as scissors are held: the hand is posed for it, then laid in."""
+"""Fingers through a loop, as a mug's handle is held: the hand closes round its bar; and thumb and fingers through
+two, as scissors are held: the hand is posed for it, then laid in."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
 from contact_builtins.grasps.opposition import frame_of
 from contact_core.arrays import BoolArray, FloatArray
-from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.raycast import Locator
-from contact_core.grasping.closing import Closed, close_hands
-from contact_core.grasping.facts import through_loops
-from contact_core.grasping.filled import filled
+from contact_core.grasping.closing import FOUND, Closed, close_hands
 from contact_core.grasping.hand import Hand
+from contact_core.grasping.loops import Loop, crossed, loops_near
 from contact_core.grasping.slots import Approaches, GraspRequest, Kind
 
-FILLED = 0.2  # hand lengths: what a ball of this radius does not reach is a hollow
-LEAST = 20  # cells of a hollow that a digit may go through
-WIDEST, THROUGH = 0.4, 0.3  # hand lengths: how far the rim of a loop may be, and how far it is free both ways
-NEAR = 0.3  # hand lengths from the place that is to be held to the middle of the nearest loop
-SPOKES = 16
+ROLLS = np.arange(16) * np.pi / 8.0  # of the palm round a bar
+TILTS = np.radians([0.0, 25.0, -25.0])  # of the fingers away from straight across it
+ROLLED = np.radians([0.0, 30.0, -30.0, 60.0, -60.0])  # of fingers that go straight through
+FREE = 0.006  # hand lengths between them and the bar
+ALONG = (0.16, 0.24, 0.32)  # hand lengths from the palm's middle at which a bar is held
+SHIFTS = (-0.12, -0.06, 0.0, 0.06, 0.12)  # hand lengths along the bar
+RELAXED = 0.3  # of its room, that a thumb is bent which takes no part
+WIDE = 0.2  # hand lengths: a bar is no wider
 CURLS = (0.15, 0.25, 0.35, 0.45, 0.55)  # of their room, that fingers are bent
 TOGETHER = ((0,), (0, 1), (1,))  # of the fingers beside the thumb, those that go through one loop
 SIDEWAYS = 0.08  # hand lengths that digits are worth which do not go straight through
 OTHERS = 0.45  # of their room, that the other fingers are bent
 TRIED = 80
+MOST = 400  # hands with fingers through a loop
 SUNK = 0.03  # hand lengths of skin in the object that spoil it
 
 
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """middle: (3,). way: (3,) unit, through it. Object's space."""
+def through_handle(request: GraspRequest, kind: Kind) -> Approaches | None:
+    """Hands that close on the bar between a place that is to be held and the loop there, the palm or the fingers'
+    bones against it; None where there is no loop."""
+    hand = request.hand
+    loops = loops_near(request.mesh, hand.length, request.at)
+    if request.at is None or not loops:
+        return None
+    bar = _bar(request, loops[0], request.at)
+    made = [*_palms_on(hand, bar, loops[0]), *_bones_on(hand, bar, loops[0])]
+    n, limits = len(made), np.ones(len(hand.bones) - 1)
+    if kind == "hook" and hand.thumb >= 0:
+        limits[hand.thumb] = RELAXED
+    placed, ways = np.array([pose for pose, _ in made]), np.array([way for _, way in made])
+    kinds = tuple[Kind, ...]([kind] * n)
+    laid = Approaches(placed, kinds, ways, np.tile(bar, (n, 1)), np.zeros(n), np.tile(limits, (n, 1)))
+    return _threading(request, laid, loops[0])
 
-    middle: FloatArray
-    way: FloatArray
+
+def _palms_on(hand: Hand, bar: FloatArray, loop: Loop) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Placements, and ways to approach in: the palm on a bar, from all sides and at several heights."""
+    for roll, tilt, side in itertools.product(ROLLS, TILTS, (1.0, -1.0)):
+        turn, out = _turned(hand, bar[3:6], loop.way, roll, tilt, side)
+        for along, shift in itertools.product(ALONG, SHIFTS):
+            held = hand.description.palm.point + along * hand.length * hand.frame[:, 1]
+            yield _laid(turn, held, bar[:3] - bar[6] * out + shift * hand.length * bar[3:6]), out
 
 
-def loops_of(request: GraspRequest, solid: DistanceField) -> list[Loop]:
-    """Hollows that a rim surrounds and through which the way is free. solid: the object with hollows filled."""
-    field, length = request.field, request.hand.length
-    marked, count = ndimage.label((field.values > 0.0) & (solid.values < 0.0))
-    locator, found = Locator.of(request.mesh), []
-    for number in range(1, count + 1):
-        cells = np.argwhere(marked == number)
-        if len(cells) < LEAST:
+def _bones_on(hand: Hand, bar: FloatArray, loop: Loop) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """The same with neighbouring fingers straight through a loop, one of their bones on the bar from within: a loop
+    may be too narrow for a bent finger. They stay where they are."""
+    outwards = bar[:3] - loop.middle
+    level = loop.middle + (outwards - (outwards @ bar[3:6]) * bar[3:6])  # of the bar, as high as the loop's middle
+    rolled = np.arctan2(outwards @ np.cross(bar[3:6], loop.way), outwards @ loop.way)
+    fingers = [d for d in range(len(hand.bones) - 1) if d != hand.thumb]
+    for bone, (first, last) in itertools.product((0, 1), itertools.combinations(range(len(fingers)), 2)):
+        chosen = [int(hand.firsts[d]) + bone for d in fingers[first : last + 1]]
+        if any(b >= hand.bones[d + 1] for b, d in zip(chosen, fingers[first : last + 1], strict=True)):
             continue
-        points = field.origin + cells * field.spacing
-        middle = points.mean(axis=0)
-        ways = np.linalg.eigh(np.cov(points.T))[1]  # a loop is flat: least far along its way
-        turn = (np.arange(SPOKES) * 2.0 * np.pi / SPOKES)[:, None]
-        spokes = np.cos(turn) * ways[:, 1] + np.sin(turn) * ways[:, 2]
-        rim = locator.cast(np.tile(middle, (SPOKES, 1)), spokes, max_distance=WIDEST * length).found
-        both = locator.cast(np.tile(middle, (2, 1)), np.stack([ways[:, 0], -ways[:, 0]]), THROUGH * length).found
-        if rim.all() and not both.any():
-            found.append(Loop(middle, ways[:, 0]))
-    return found
+        rest = hand.rig.rest_world[hand.joints[chosen]]
+        middles = np.einsum("bij,bj->bi", rest[:, :3, :3], hand.capsules[chosen].mean(axis=1)) + rest[:, :3, 3]
+        held = middles.mean(axis=0) + hand.radii[chosen].mean() * hand.frame[:, 0]
+        for roll, tilt, side in itertools.product(ROLLED, TILTS, (1.0, -1.0)):
+            turn, out = _turned(hand, bar[3:6], loop.way, rolled + roll, tilt, side)
+            yield _laid(turn, held, level - (bar[6] + FREE * hand.length) * out), np.zeros(3)
+
+
+def _turned(
+    hand: Hand, axis: FloatArray, way: FloatArray, roll: float, tilt: float, side: float
+) -> tuple[FloatArray, FloatArray]:
+    """(3, 3) a hand's turn with fingers across an axis, and (3,) where its palm looks: `way` rolled about it."""
+    first = way - (way @ axis) * axis
+    first = first / np.linalg.norm(first)
+    out = np.cos(roll) * first + np.sin(roll) * np.cross(axis, first)
+    across = side * (np.cos(tilt) * np.cross(axis, out) + np.sin(tilt) * axis)
+    return np.stack([out, across, np.cross(out, across)], axis=1) @ hand.frame.T, out
+
+
+def _laid(turn: FloatArray, held: FloatArray, at: FloatArray) -> FloatArray:
+    """(4, 4) of a hand that is turned so, with its point `held` in rig space at a place."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, at - turn @ held
+    return pose
+
+
+def _threading(request: GraspRequest, made: Approaches, loop: Loop) -> Approaches | None:
+    """Those of some approaches with the most fingers through a loop, and none deep in the object. Fingers that then
+    hold nothing take no part."""
+    hand = request.hand
+    closed = close_hands(hand.quick, request.field, made.placed, made.ways, made.bars, made.curls, made.limits)
+    frames = hand.frames(closed.placed, closed.angles, closed.turns)
+    fingers = np.arange(len(hand.bones) - 1) != hand.thumb
+    through = crossed(hand, frames, loop) & fingers
+    clear = np.where(fingers, closed.clear, np.inf).min(axis=1)
+    fits = np.isfinite(closed.travel) & (np.minimum(clear, closed.palm) > -SUNK * hand.length)
+    count = np.where(fits, through.sum(axis=1), 0)
+    rows = np.flatnonzero(count >= min(2, count.max()))
+    if not count.max():
+        return None
+    holds = through | (closed.clear < FOUND * hand.length)
+    limits = np.where(fingers & ~holds, np.minimum(made.limits, OTHERS), made.limits)
+    return replace(made, limits=limits)[rows[np.argsort(-count[rows], kind="stable")][:MOST]]
+
+
+def _bar(request: GraspRequest, loop: Loop, at: FloatArray) -> FloatArray:
+    """(7,) middle, axis and radius of what is round a loop at the place that is to be held."""
+    nearest = int(np.linalg.norm(loop.rim - at, axis=1).argmin())
+    axis = loop.rim[(nearest + 1) % len(loop.rim)] - loop.rim[nearest - 1]
+    axis = axis / np.linalg.norm(axis)
+    out = np.cross(axis, loop.way)
+    out = out * np.sign(out @ (loop.rim[nearest] - loop.middle))
+    length, locator = request.hand.length, Locator.of(request.mesh)
+    start = loop.rim[nearest] + 1e-3 * length * out
+    thick = locator.cast(start[None], out[None])
+    middle = start + 0.5 * float(thick.distance[0]) * out if thick.found[0] else start
+    sides = locator.cast(np.tile(middle, (2, 1)), np.stack([loop.way, -loop.way]))
+    wide = float(sides.distance.sum()) if sides.found.all() else 0.0
+    radius = 0.5 * max(2.0 * float(np.linalg.norm(middle - start)), min(wide, WIDE * length), 0.02 * length)
+    return np.concatenate([middle, axis, [radius]])
 
 
 def through_two(request: GraspRequest) -> Approaches | None:
@@ -66,31 +140,26 @@ def through_two(request: GraspRequest) -> Approaches | None:
     hand, at = request.hand, request.at
     if at is None or hand.thumb != 0 or hand.first_finger < 0:
         return None
-    solid = filled(request.field, FILLED * hand.length)
-    loops = loops_of(request, solid)
-    loops.sort(key=lambda loop: float(np.linalg.norm(loop.middle - at)))
-    if len(loops) < 2 or np.linalg.norm(loops[0].middle - at) > NEAR * hand.length:
+    loops = loops_near(request.mesh, hand.length, at)
+    if len(loops) < 2:
         return None
     made = _laid_in(hand, loops[:2])
     closed = close_hands(hand, request.field, made.placed, made.ways, made.bars, made.curls, made.limits)
-    inside = _through_both(request, solid, loops[:2], closed)
+    inside = _through_both(hand, loops[:2], closed)
     clear = np.minimum(closed.clear.min(axis=1), closed.palm) > -SUNK * hand.length
     kept = np.flatnonzero(inside & clear)
     return made[kept] if len(kept) else None
 
 
-def _through_both(request: GraspRequest, solid: DistanceField, loops: list[Loop], closed: Closed) -> BoolArray:
+def _through_both(hand: Hand, loops: tuple[Loop, ...], closed: Closed) -> BoolArray:
     """(N,) which closed hands have the thumb through one of two loops and a finger through the other."""
-    frames = request.hand.frames(closed.placed, closed.angles, closed.turns)
-    apart = float(np.linalg.norm(loops[0].middle - loops[1].middle))
-    through = [
-        through_loops(request.hand, frames, request.field, solid, loop.middle, 0.5 * apart) for loop in loops
-    ]
+    frames = hand.frames(closed.placed, closed.angles, closed.turns)
+    through = [crossed(hand, frames, loop) for loop in loops]
     one, other = ((a[:, 0] & b[:, 1:].any(axis=1)) for a, b in (through, through[::-1]))
     return np.asarray(one | other)
 
 
-def _laid_in(hand: Hand, loops: list[Loop]) -> Approaches:
+def _laid_in(hand: Hand, loops: tuple[Loop, ...]) -> Approaches:
     """Hands whose thumb and fingers are as far apart as two loops, side by side, laid into them from both sides."""
     thumbs = [(start, *_last(hand, 0, start, 0.0, 1)) for start in range(int(hand.start_counts[0]))]
     fingers = len(hand.bones) - 2

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.grasping.closing import close_hands
@@ -18,10 +17,8 @@ from contact_core.grasping.facts import (
     enclosure,
     opposition,
     skin_through,
-    through_loops,
     thumb_along,
 )
-from contact_core.grasping.filled import filled
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.slots import KINDS
 from contact_core.grasping.verdict import judge_hold, margin
@@ -137,25 +134,6 @@ def test_digits_at_rest_do_not_cross_and_those_that_spread_through_one_another_d
     moved = one.joints[second : one.bones[4]]
     world[moved, :3, 3] += world[one.joints[first], :3, 3] - world[one.joints[second], :3, 3]
     assert crossing(one, world) > 0.5
-
-
-def test_a_finger_in_a_ring_is_through_and_one_beside_it_is_not() -> None:
-    one = hand()
-    frames = one.frames(
-        np.eye(4)[None], np.zeros((1, len(one.joints))), np.tile(np.eye(3), (1, len(one.bones) - 1, 1, 1))
-    )
-    tip = one.bones[2] - 1  # of the first finger
-    middle = frames[0, tip, :3, :3] @ one.capsules[tip].mean(axis=0) + frames[0, tip, :3, 3]
-    ring = meshes.torus()
-    size = 4.0 * one.radii[tip] / np.ptp(ring.points, axis=0).max()
-    ring = TriangleMesh(size * (ring.points - ring.points.mean(axis=0)) + middle, ring.faces)
-    field = DistanceField.of(ring, resolution=60)
-    solid = filled(field, 4.0 * one.radii[tip])
-    assert through_loops(one, frames, field, solid, middle)[0].tolist() == [
-        d == 1 for d in range(len(one.bones) - 1)
-    ]
-    assert not through_loops(one, frames, field, field, middle).any(), "nothing is hollow that is not filled"
-    assert not through_loops(one, frames, field, solid, middle + one.length).any()
 
 
 @pytest.mark.parametrize("kind", KINDS)

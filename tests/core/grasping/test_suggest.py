@@ -9,16 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contact_builtins.grasps.loops import loops_of
 from contact_core.cli import main
 from contact_core.document.schema import parse_document as load_document
 from contact_core.errors import Cancelled, InvalidInput
 from contact_core.grasp_files.grasp import HAND, OBJECT, grasp, prepare
-from contact_core.grasping.facts import through_loops
 from contact_core.grasping.finishing import Suggestion
+from contact_core.grasping.loops import digits_through, loops_near
 from contact_core.grasping.pads import remark_on_size
 from contact_core.grasping.searching import GraspSettings
-from contact_core.grasping.slots import GraspRequest, lacks
+from contact_core.grasping.slots import lacks
 from contact_core.grasping.suggest import suggest
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.plugins.manager import PluginManager
@@ -161,15 +160,13 @@ def test_an_object_of_a_wrong_size_is_told(scale: float, word: str) -> None:
 def test_scissors_take_the_thumb_in_one_loop_and_a_finger_in_the_other() -> None:
     session = prepare("sample:human_hand", "sample:scissors", 1.0, PluginManager()).session
     scene, between = grasp_scene(session, HAND, OBJECT), (0.0, -0.062, 0.0)
-    request = GraspRequest(scene.hand, scene.mesh, scene.field, ("precision",), np.array(between))
-    loops = loops_of(request, scene.solid)
+    loops = loops_near(scene.mesh, scene.hand.length, np.array(between))
     assert sorted(np.sign(loop.middle[0]) for loop in loops) == [-1.0, 1.0], "two loops, and no crotch of blades"
     assert all(abs(loop.way[2]) > 0.98 for loop in loops)
     found = max(suggest(scene, GraspSettings(8, kinds=("precision",), at=between)), key=lambda each: each.score)
     assert found.is_grasp, found.verdict.failures
     posed = scene.object_from_rig @ posed_world(scene.rig, found.proposal.poses[HAND])
-    frames, half = posed[scene.hand.joints][None], 0.5 * float(np.ptp([loop.middle[0] for loop in loops]))
-    through = [through_loops(scene.hand, frames, scene.field, scene.solid, loop.middle, half)[0] for loop in loops]
+    (through,) = digits_through(scene.hand, posed[scene.hand.joints][None], loops)
     thumbs = [bool(each[scene.hand.thumb]) for each in through]
     assert sorted(thumbs) == [False, True], "the thumb is in one of them"
     assert through[thumbs.index(False)].any(), "and a finger in the other"
