@@ -15,7 +15,7 @@ from contact_core.grasping.closing import Closed, close_hands, relaxed
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.loops import digits_through
 from contact_core.grasping.scene import GraspScene, uniform_scale_of
-from contact_core.grasping.screening import distinct, elsewhere, first_look, seen_from
+from contact_core.grasping.screening import ALIKE, distinct, elsewhere, first_look, seen_from
 from contact_core.grasping.slots import KINDS, Approaches, GraspRequest, Kind, lacks
 from contact_core.plugins.registry import GRASP_SAMPLERS
 from contact_core.progress import NO_PROGRESS, Progress
@@ -26,6 +26,7 @@ TURNS = ("power", "power", "precision", "power", "pinch", "power", "hook")  # on
 BOTH = 0.8  # what it is worth that the thumb is through one loop and a finger through another
 THREADED = 0.3  # what each finger through a loop at the place to hold is worth to a first look
 BESIDE = 0.6  # what it costs that the thumb is through the same
+LIKE = 0.25  # times as far apart as grasps that are not alike: such are tried where there are few of those
 WORSE, HOPELESS = 1.1, -0.6  # a first look that is worse than the best by so much, and below that, is not tried
 USUAL: tuple[Kind, ...] = ("power", "precision", "pinch", "hook")
 
@@ -130,8 +131,9 @@ def _shared_out(approaches: Approaches, values: FloatArray, most: int) -> IntArr
 
 
 def chosen(hand: Hand, approaches: Approaches, value: FloatArray, seen: FloatArray, count: int) -> IntArray:
-    """The approaches worth solving, in the order in which they are: two of three are power grasps, where there are
-    such; none is like one before it."""
+    """The approaches worth solving, `count` at most, in the order in which they are: two of three are power grasps,
+    where there are such; none is like one before it. Where these are few, as on a ball, which looks the same from
+    everywhere, others follow that are somewhat like them: a search that ends a little elsewhere may succeed."""
     names = np.array(approaches.kinds)
     queues: dict[str, list[int]] = {}
     for kind in dict.fromkeys(approaches.kinds):
@@ -142,4 +144,7 @@ def chosen(hand: Hand, approaches: Approaches, value: FloatArray, seen: FloatArr
     result: list[int] = []
     while any(queues.values()) and len(result) < count:
         result.extend(queues[kind].pop(0) for kind in turn if queues[kind])
-    return distinct(seen, np.array(result, np.int64), count, hand.length)
+    first = distinct(seen, np.array(result, np.int64), count, hand.length)
+    others = np.setdiff1d(np.flatnonzero(value >= min(value.max() - WORSE, HOPELESS)), first)
+    others = others[np.argsort(-value[others], kind="stable")]
+    return distinct(seen, np.concatenate([first, others]), count, hand.length, LIKE * ALIKE)

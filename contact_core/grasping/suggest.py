@@ -24,7 +24,8 @@ from contact_core.plugins.registry import GRASP_SCORES
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.draft import Draft
 
-MOST_TRIED = 3  # times as many as are wanted are solved at most
+MOST_TRIED = 3  # times as many as are wanted are solved at most,
+LEAST_TRIED = 8  # or so many: who wants one good grasp does not care how many others failed
 LIES = 0.02  # hand lengths: a pad of the closed hand that is nearer lies on a bar
 REACHED = 0.5  # hand lengths: a place to hold that is farther from the object is none of its
 
@@ -38,7 +39,7 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
     scene = replace(scene, at=at)
     base, pads, proposed = painted_pads(scene, at, "lateral" in kinds)
     approaches, closed, value, seen = screened(scene, settings, progress.part(0.02, 0.3))
-    order = chosen(scene.hand, approaches, value, seen, MOST_TRIED * settings.count)
+    order = chosen(scene.hand, approaches, value, seen, max(MOST_TRIED * settings.count, LEAST_TRIED))
     if not len(order):
         what = f"for a {' or '.join(settings.kinds)} grasp " if settings.kinds else ""
         raise InvalidInput(f"the hand found no place {what}at which it touches the object. {remark_on_size(scene)}")
