@@ -71,7 +71,8 @@ def _gaps(mesh: TriangleMesh, locator: Locator, length: float, at: FloatArray) -
     near = np.flatnonzero(np.linalg.norm(points - at, axis=1) < NEAR * length)
     points, normals = points[near] + 1e-4 * length * normals[near], normals[near]
     ahead = locator.cast(points, normals, max_distance=2.0 * WIDEST * length)
-    middles = (points + 0.5 * ahead.distance[:, None] * normals)[ahead.found]
+    found = ahead.found
+    middles = points[found] + 0.5 * ahead.distance[found, None] * normals[found]
     return middles[spread_out(middles, GAPS, 0)]
 
 
