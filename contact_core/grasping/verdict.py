@@ -128,9 +128,9 @@ def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
     if metrics["pads_placed"] < PADS_PLACED[kind]:
         share = f"{100 * metrics['pads_placed']:.0f} % of the pads"
         failures.append(f"only {share} found a place, a {kind} grasp wants {100 * PADS_PLACED[kind]:.0f} %")
-    if metrics["closure"] < _least_closure(metrics, kind):
+    if metrics["closure"] < floor(CLOSURE, metrics, kind):
         failures.append("the contacts do not hold the object: it would slip or turn out of the hand")
-    if metrics["opposition_deg"] < OPPOSED[kind]:
+    if metrics["opposition_deg"] < floor(OPPOSED, metrics, kind):
         failures.append(
             "the hand is laid on the object and does not close round it: fingers press from"
             f" {metrics['opposition_deg']:.0f} degrees against thumb and palm, wanted >= {OPPOSED[kind]:.0f}"
@@ -147,9 +147,10 @@ def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
     return tuple(failures)
 
 
-def _least_closure(metrics: Mapping[str, Any], kind: str) -> float:
-    """Fingers through a loop cannot lose it, however slippery it is."""
-    return -np.inf if metrics.get("digits_through", 0) >= CAGED else CLOSURE[kind]
+def floor(limits: Mapping[str, float], metrics: Mapping[str, Any], kind: str) -> float:
+    """Of closure or opposition. Fingers through a loop are round it and cannot lose it, however slippery it is and
+    wherever the thumb lies, on top of a handle for instance."""
+    return -np.inf if metrics.get("digits_through", 0) >= CAGED else limits[kind]
 
 
 def margin(metrics: Mapping[str, Any], kind: str) -> float:
@@ -158,8 +159,8 @@ def margin(metrics: Mapping[str, Any], kind: str) -> float:
     the verdict of a grasp that has none."""
     limits = [(metrics.get(key), sign, limit) for key, (sign, limit) in ACCEPT.items()]
     limits += [
-        (metrics.get("closure"), ">=", _least_closure(metrics, kind)),
-        (metrics.get("opposition_deg"), ">=", OPPOSED[kind]),
+        (metrics.get("closure"), ">=", floor(CLOSURE, metrics, kind)),
+        (metrics.get("opposition_deg"), ">=", floor(OPPOSED, metrics, kind)),
         (metrics.get("crossing"), "<=", CROSSING),
         (metrics.get("skin_through"), "<=", SKIN_THROUGH),
         (metrics.get("uneven_curl_deg"), "<=", UNEVEN),

@@ -65,8 +65,8 @@ class Around(HasSettings):
                 free = joined[_palm_is_free(request, joined)]
                 share = SHARES.get(kind, 1.0) / sum(SHARES.get(each, 1.0) for each in wanted)
                 parts.append(_thinned(free, int(share * self.most), request.seed))
-        handled = [through_handle(request, kind) for kind in wanted if kind in ("power", "hook")]
-        parts.extend(made for made in handled if made is not None)
+        if (handled := through_handle(request, tuple(wanted))) is not None:
+            parts.append(handled)
         if "precision" in wanted and (threaded := through_two(request)) is not None:
             parts.append(threaded)
         return Approaches.joined(parts) if parts else _none(hand)

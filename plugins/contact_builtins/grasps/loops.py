@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from contact_builtins.grasps.opposition import frame_of
-from contact_core.arrays import BoolArray, FloatArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.geometry.raycast import Locator
 from contact_core.grasping.closing import FOUND, Closed, close_hands
 from contact_core.grasping.hand import Hand
@@ -30,26 +30,35 @@ TOGETHER = ((0,), (0, 1), (1,))  # of the fingers beside the thumb, those that g
 SIDEWAYS = 0.08  # hand lengths that digits are worth which do not go straight through
 OTHERS = 0.45  # of their room, that the other fingers are bent
 TRIED = 80
-MOST = 400  # hands with fingers through a loop
+MOST = 300  # hands with fingers through a loop
+EASED, EASY = 5, 0.004  # times that such a hand is moved out of the object, hand lengths that it may be in it
+JAMMED = 60.0  # fingers through a loop that it costs to be one hand length deeper
 SUNK = 0.03  # hand lengths of skin in the object that spoil it
 
 
-def through_handle(request: GraspRequest, kind: Kind) -> Approaches | None:
+def through_handle(request: GraspRequest, kinds: tuple[Kind, ...]) -> Approaches | None:
     """Hands that close on the bar between a place that is to be held and the loop there, the palm or the fingers'
-    bones against it; None where there is no loop."""
-    hand = request.hand
+    bones against it, for power and hook grasps; None where there is no loop."""
+    hand, own = request.hand, [kind for kind in kinds if kind in ("power", "hook")]
     loops = loops_near(request.mesh, hand.length, request.at)
-    if request.at is None or not loops:
+    if request.at is None or not loops or not own:
         return None
     bar = _bar(request, loops[0], request.at)
     made = [*_palms_on(hand, bar, loops[0]), *_bones_on(hand, bar, loops[0])]
-    n, limits = len(made), np.ones(len(hand.bones) - 1)
-    if kind == "hook" and hand.thumb >= 0:
-        limits[hand.thumb] = RELAXED
+    n = len(made)
     placed, ways = np.array([pose for pose, _ in made]), np.array([way for _, way in made])
-    kinds = tuple[Kind, ...]([kind] * n)
-    laid = Approaches(placed, kinds, ways, np.tile(bar, (n, 1)), np.zeros(n), np.tile(limits, (n, 1)))
-    return _threading(request, laid, loops[0])
+    limits = np.ones((n, len(hand.bones) - 1))
+    laid = Approaches(placed, (own[0],) * n, ways, np.tile(bar, (n, 1)), np.zeros(n), limits)
+    found = _threading(request, laid, loops[0])
+    return None if found is None else Approaches.joined([_of_kind(hand, found, kind) for kind in own])
+
+
+def _of_kind(hand: Hand, made: Approaches, kind: Kind) -> Approaches:
+    """The same hands as grasps of a kind; the thumb takes no part in a hook."""
+    limits = made.limits.copy()
+    if kind == "hook" and hand.thumb >= 0:
+        limits[:, hand.thumb] = RELAXED
+    return replace(made, kinds=(kind,) * len(made.kinds), limits=limits)
 
 
 def _palms_on(hand: Hand, bar: FloatArray, loop: Loop) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -99,22 +108,64 @@ def _laid(turn: FloatArray, held: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def _threading(request: GraspRequest, made: Approaches, loop: Loop) -> Approaches | None:
-    """Those of some approaches with the most fingers through a loop, and none deep in the object. Fingers that then
-    hold nothing take no part."""
+    """Those of some approaches with the most fingers through a loop, moved so that none is deep in the object.
+    Fingers that then hold nothing take no part."""
     hand = request.hand
-    closed = close_hands(hand.quick, request.field, made.placed, made.ways, made.bars, made.curls, made.limits)
-    frames = hand.frames(closed.placed, closed.angles, closed.turns)
+    closed = _closed(request, made)
+    made = replace(made, placed=closed.placed, ways=np.zeros_like(made.ways))
+    made = made[_best(hand, closed, loop)]
+    for _ in range(EASED):
+        made = _eased(request, made)
+    closed = _closed(request, made)
+    rows = _best(hand, closed, loop)
+    holds = _through(hand, closed, loop) | (closed.clear < FOUND * hand.length)
+    holds[:, hand.thumb] |= hand.thumb >= 0
+    limits = np.where(holds, made.limits, np.minimum(made.limits, OTHERS))
+    return replace(made, limits=limits)[rows] if len(rows) else None
+
+
+def _best(hand: Hand, closed: Closed, loop: Loop) -> IntArray:
+    """Closed hands with two fingers or more through a loop, or one where none has two, the best first: many fingers
+    through it, and not deep in the object."""
     fingers = np.arange(len(hand.bones) - 1) != hand.thumb
-    through = crossed(hand, frames, loop) & fingers
-    clear = np.where(fingers, closed.clear, np.inf).min(axis=1)
-    fits = np.isfinite(closed.travel) & (np.minimum(clear, closed.palm) > -SUNK * hand.length)
-    count = np.where(fits, through.sum(axis=1), 0)
-    rows = np.flatnonzero(count >= min(2, count.max()))
-    if not count.max():
-        return None
-    holds = through | (closed.clear < FOUND * hand.length)
-    limits = np.where(fingers & ~holds, np.minimum(made.limits, OTHERS), made.limits)
-    return replace(made, limits=limits)[rows[np.argsort(-count[rows], kind="stable")][:MOST]]
+    clear = np.minimum(np.where(fingers, closed.clear, np.inf).min(axis=1), closed.palm) / hand.length
+    count = np.where(np.isfinite(closed.travel) & (clear > -SUNK), _through(hand, closed, loop).sum(axis=1), 0)
+    rows = np.flatnonzero((count > 0) & (count >= min(2, count.max(initial=0))))
+    worth = count[rows] + JAMMED * np.minimum(clear[rows] + EASY, 0.0)
+    return np.asarray(rows[np.argsort(-worth, kind="stable")][:MOST])
+
+
+def _closed(request: GraspRequest, made: Approaches) -> Closed:
+    return close_hands(
+        request.hand.quick, request.field, made.placed, made.ways, made.bars, made.curls, made.limits
+    )
+
+
+def _through(hand: Hand, closed: Closed, loop: Loop) -> BoolArray:
+    """(N, D) which fingers of closed hands go through a loop."""
+    frames = hand.frames(closed.placed, closed.angles, closed.turns)
+    return crossed(hand, frames, loop) & (np.arange(len(hand.bones) - 1) != hand.thumb)
+
+
+def _eased(request: GraspRequest, made: Approaches) -> Approaches:
+    """Hands moved as far out of the object as the deepest skin of palm and fingers is in it once they are closed,
+    the way that it looks on average."""
+    hand, closed = request.hand, _closed(request, made)
+    fingers = slice(hand.probe_starts[hand.thumb + 1] if hand.thumb >= 0 else 0, None)
+    bones = hand.probe_bones[fingers]
+    frames = hand.frames(closed.placed, closed.angles, closed.turns)[:, bones]  # (N, P, 4, 4)
+    skin = np.einsum("npij,pj->npi", frames[:, :, :3, :3], hand.probes[fingers]) + frames[:, :, :3, 3]
+    palm = np.einsum("nij,pj->npi", made.placed[:, :3, :3], hand.tested) + made.placed[:, None, :3, 3]
+    points = np.concatenate([skin, palm], axis=1)
+    distance, outwards = request.field.sample(points.reshape(-1, 3))
+    depth = np.maximum(-distance.reshape(points.shape[:2]) - EASY * hand.length, 0.0)
+    mean = (
+        np.einsum("np,npi->ni", depth, outwards.reshape(points.shape))
+        / np.maximum(depth.sum(axis=1), 1e-12 * hand.length)[:, None]
+    )
+    placed = made.placed.copy()
+    placed[:, :3, 3] += depth.max(axis=1, initial=0.0)[:, None] * mean
+    return replace(made, placed=placed)
 
 
 def _bar(request: GraspRequest, loop: Loop, at: FloatArray) -> FloatArray:

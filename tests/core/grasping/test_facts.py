@@ -153,7 +153,10 @@ def test_a_good_hold_has_no_failure_and_each_fault_is_named(kind: str) -> None:
         told = judge_hold({**GOOD, key: value}, kind)
         assert len(told) == 1 and word in told[0], (key, told)
     if kind == "power":
-        assert "hold" in judge_hold({**GOOD, "closure": -0.2}, kind)[0]
+        slips = {**GOOD, "closure": -0.2, "opposition_deg": 60.0}
+        assert "hold" in judge_hold(slips, kind)[0] and "laid on" in judge_hold(slips, kind)[1]
+        assert len(judge_hold({**slips, "digits_through": 1}, kind)) == 2
+        assert judge_hold({**slips, "digits_through": 2}, kind) == (), "two fingers through a loop cannot lose it"
 
 
 def test_along_is_the_way_of_a_rod_and_no_way_on_a_plate_or_a_ball() -> None:

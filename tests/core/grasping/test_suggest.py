@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from contact_builtins.samples.fields import chain, cylinder, union, without
+from contact_builtins.samples.modelling import surface_of
 from contact_core.cli import main
 from contact_core.document.schema import parse_document as load_document
 from contact_core.errors import Cancelled, InvalidInput
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.grasp_files.grasp import HAND, OBJECT, grasp, prepare
 from contact_core.grasping.finishing import Suggestion
 from contact_core.grasping.loops import digits_through, loops_near
@@ -170,3 +173,41 @@ def test_scissors_take_the_thumb_in_one_loop_and_a_finger_in_the_other() -> None
     thumbs = [bool(each[scene.hand.thumb]) for each in through]
     assert sorted(thumbs) == [False, True], "the thumb is in one of them"
     assert through[thumbs.index(False)].any(), "and a finger in the other"
+
+
+def pitcher() -> TriangleMesh:
+    """20 cm tall, with a handle of 11 cm that takes four fingers."""
+    body = without(
+        cylinder([0, 0.1, 0], 0.06, 0.1, rounding=0.006), cylinder([0, 0.13, 0], 0.054, 0.124, rounding=0.009), 4e-3
+    )
+    bow = [(56, 165), (75, 172), (95, 168), (104, 155), (105, 120), (102, 85), (92, 60), (75, 50), (56, 50)]
+    handle = chain(np.array([[x, y, 0.0] for x, y in bow]) * 1e-3, np.full(len(bow), 8e-3))
+    shape = without(union([body, handle], 8e-3), cylinder([0, 0.13, 0], 0.054, 0.124, rounding=0.009), 4e-3)
+    return surface_of(shape, np.array([-0.07, -0.01, -0.07]), np.array([0.125, 0.215, 0.07]), 3.5e-3, 4e-3)
+
+
+@pytest.mark.parametrize(
+    ("thing", "at", "least"), [("mug", (0.076, 0.047, 0), 2), ("pitcher", (0.113, 0.12, 0), 3)]
+)
+def test_a_handle_takes_fingers_through_its_loop_and_the_thumb_stays_outside(
+    thing: str, at: tuple[float, float, float], least: int, tmp_path: Path
+) -> None:
+    name = "sample:mug"
+    if thing == "pitcher":
+        mesh = pitcher()
+        lines = [f"v {x} {y} {z}" for x, y, z in mesh.points] + [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
+        name = str(tmp_path / "pitcher.obj")
+        Path(name).write_text("\n".join(lines))
+    scene = grasp_scene(prepare("sample:human_hand", name, 1.0, PluginManager()).session, HAND, OBJECT)
+    grasps = list(suggest(scene, GraspSettings(4, kinds=("power", "hook"), at=at)))
+    best = max(grasps, key=lambda each: each.score)
+    assert best.is_grasp, best.verdict.failures
+    through = best.facts.metrics["through_loop"]
+    assert least <= len(through) <= 4 and "thumb" not in through
+    assert sum(one.is_grasp for one in grasps) >= 3
+    for one in grasps:
+        posed = scene.object_from_rig @ posed_world(scene.rig, one.proposal.poses[HAND])
+        loops = loops_near(scene.mesh, scene.hand.length, np.array(at))
+        (goes,) = digits_through(scene.hand, posed[scene.hand.joints][None], loops)
+        roles = [digit.role for digit, through in zip(scene.hand.digits, goes.any(axis=0), strict=True) if through]
+        assert one.facts.metrics["through_loop"] == roles, "the report names those"
