@@ -14,6 +14,34 @@ _ONE, _SHIFT = np.uint64(1), np.uint64(29)
 
 
 @kernel
+def walk_round(sizes: IntArray, indices: IntArray, face: IntArray, head: IntArray) -> None:
+    """Write the polygon of each side (h,), and the point that it runs to.
+
+    sizes: (f,) corners per polygon. indices: (h,) their points, polygon after polygon.
+    """
+    h = np.int64(0)
+    for f in range(len(sizes)):
+        first = h
+        for _ in range(sizes[f]):
+            face[h] = f
+            if h > first:
+                head[h - 1] = indices[h]
+            h += 1
+        if h > first:
+            head[h - 1] = indices[first]
+
+
+@kernel
+def ends_of_edges(edge: IntArray, first: IntArray, last: IntArray) -> None:
+    """Write the first and the last side (edges,) at each edge; first: -1 on entry. edge: (h,) of each side."""
+    for h in range(len(edge)):
+        e = edge[h]
+        if first[e] < 0:
+            first[e] = h
+        last[e] = h
+
+
+@kernel
 def number_edges(
     tail: IntArray,
     head: IntArray,

@@ -17,7 +17,6 @@ from contact_core.arrays import BoolArray, FloatArray, IntArray, frozen
 from contact_core.geometry.stitch import (
     Sides,
     joined_points,
-    open_sides,
     pairs_of_open_sides,
     without,
     without_crowds,
@@ -73,11 +72,12 @@ def sound_polygons(
     winding, label = _wound(joining)
     first = _first_of_each(label)
     turned = _turned_outwards(points[first], sides.between(label), winding, clockwise, notes)
+    corners = _reversed_where(turned, sides)
     return SoundPolygons(
         point_of=label,
         first=first,
         sizes=sizes[kept],
-        indices=label[_reversed_where(turned, sides)],
+        indices=corners if _is_each_its_own(label) else label[corners],
         face_of=np.flatnonzero(kept),
         notes=(*_joining_notes(sides.tail, label), *joining.notes, *notes, *_loose_notes(winding)),
     )
@@ -105,9 +105,11 @@ def _shortest_edges(points: FloatArray, sides: Sides) -> FloatArray:
 def _groups(points: FloatArray, sides: Sides, reach: FloatArray, apart: IntArray | None) -> IntArray:
     """(n,) group of each point that lies at one place: equal positions, on open sides also close ones."""
     on_border = np.zeros(len(points), bool)
-    loose = open_sides(sides)
+    loose = sides.open
     on_border[sides.tail[loose]] = on_border[sides.head[loose]] = True
     group = close_points(points, np.where(on_border, np.where(np.isfinite(reach), reach, 0.0), 0.0))
+    if apart is None and _is_each_its_own(group):
+        return group
     shrunk = np.flatnonzero(group[sides.tail] == group[sides.head])
     shrunk = shrunk[(points[sides.tail[shrunk]] != points[sides.head[shrunk]]).any(axis=1)]
     if not len(shrunk) and apart is None:
@@ -179,9 +181,10 @@ def _joining(
     kept = _single_faces(group, sizes, indices, notes)
     sides = shape if kept.all() else Sides.of(sizes[kept], indices[np.repeat(kept, sizes)])
     pairs, label = np.zeros((0, 2), np.int64), np.arange(len(points))
-    loose = open_sides(sides)
+    loose = sides.open
     if len(loose):
         pairs = pairs_of_open_sides(points, sides, loose, group, either_sense=either_sense)
+    if len(pairs):
         pairs, label = without_crowds(len(points), sides, group, pairs)
     return _Joining(kept, sides, group, pairs, label, tuple(notes))
 
@@ -200,7 +203,7 @@ def _across_noise(
     Then the gaps are noise of whatever wrote the file, and no part of the shape. Sides that run the same direction
     are joined in heaps of loose faces only: the borders of two layers of cloth run so, too.
     """
-    still = open_sides(so_far.sides.between(so_far.label))
+    still = so_far.sides.between(so_far.label).open
     if not len(still):
         return so_far
     border = np.unique(np.concatenate([so_far.sides.tail[still], so_far.sides.head[still]]))
@@ -213,7 +216,7 @@ def _across_noise(
     group = _groups(points, sides, np.minimum(reach, 2.0 * widest), apart)  # twice: copies lie all round a point
     heap = len(still) > _HEAP * len(so_far.sides.face)
     wider = _joining(points, sizes, indices, sides, group, either_sense=heap)
-    left = len(open_sides(wider.sides.between(wider.label)))
+    left = len(wider.sides.between(wider.label).open)
     if left > (1.0 - _MOST) * len(still):
         return so_far
     notes.append(
@@ -297,10 +300,17 @@ def _first_of_each(label: IntArray) -> IntArray:
 
 def _joining_notes(used: IntArray, label: IntArray) -> list[str]:
     """used: points, with repeats (np.unique of so many takes as long as all the rest)."""
+    if _is_each_its_own(label):
+        return []
     is_used, is_left = np.zeros(len(label), bool), np.zeros(len(label), bool)
     is_used[used] = is_left[label[used]] = True
     before, after = np.count_nonzero(is_used), np.count_nonzero(is_left)
     return [f"{before} vertices lie at {after} positions; they were welded."] if after < before else []
+
+
+def _is_each_its_own(label: IntArray) -> bool:
+    """Whether labels, numbered by first appearance, join nothing: most files need no welding."""
+    return int(label.max(initial=-1)) + 1 == len(label)
 
 
 def _loose_notes(winding: Winding) -> list[str]:

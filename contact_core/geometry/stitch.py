@@ -28,11 +28,12 @@ class Sides:
     @classmethod
     def of(cls, sizes: IntArray, indices: IntArray) -> Sides:
         """sizes: (f,) corners per polygon. indices: (sum of sizes,) points, polygon after polygon."""
-        following = np.arange(1, len(indices) + 1)
-        ends = np.cumsum(sizes)
-        held = sizes > 0
-        following[ends[held] - 1] = (ends - sizes)[held]
-        return cls(np.repeat(np.arange(len(sizes)), sizes), indices, indices[following])
+        from contact_core.geometry.side_kernels import walk_round
+
+        indices = np.ascontiguousarray(indices)
+        face, head = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
+        walk_round(np.ascontiguousarray(sizes), indices, face, head)
+        return cls(face, indices, head)
 
     def between(self, group: IntArray) -> Sides:
         """The sides with group[point] for each point."""
@@ -59,20 +60,25 @@ class Sides:
         return edge, count
 
     @cached_property
+    def crowd(self) -> IntArray:
+        """(h,) how many sides there are at the edge of each side, itself included."""
+        edge, count = self.edges
+        return count[edge]
+
+    @cached_property
+    def open(self) -> IntArray:
+        """(b,) sides whose edge has no other face."""
+        return np.flatnonzero(self.crowd == 1)
+
+    @cached_property
     def edge_ends(self) -> tuple[IntArray, IntArray]:
         """(edges,) the first and the last side at each edge."""
+        from contact_core.geometry.side_kernels import ends_of_edges
+
         edge, count = self.edges
-        first, last = np.empty(len(count), np.int64), np.empty(len(count), np.int64)
-        sides = np.arange(len(edge))
-        first[edge[::-1]] = sides[::-1]  # what is written last stays
-        last[edge] = sides
+        first, last = np.full(len(count), -1, np.int64), np.empty(len(count), np.int64)
+        ends_of_edges(edge, first, last)
         return first, last
-
-
-def open_sides(sides: Sides) -> IntArray:
-    """(b,) sides whose edge has no other face."""
-    edge, count = sides.edges
-    return np.flatnonzero(count[edge] == 1)
 
 
 def pairs_of_open_sides(

@@ -8,6 +8,7 @@ import numpy as np
 
 from contact_core.geometry.exact_geodesics import exact_geodesic
 from contact_core.geometry.mesh import TriangleMesh
+from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.geometry.thinning import first_of_each, meeting, spacing_of
@@ -26,5 +27,6 @@ def warm_up() -> float:
     headings = np.array([path.heading, path.ending_heading])
     direction_to_heading(mesh, ends, heading_to_direction(mesh, ends, headings))
     first_of_each(points, 0.1)
+    sound_polygons(points, [3, 3, 3], mesh.faces.ravel())
     meeting(mesh.points, mesh.points, 0.1, spacing_of(mesh.points, 2))
     return time.perf_counter() - start

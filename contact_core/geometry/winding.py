@@ -32,7 +32,8 @@ def wound_alike(sides: Sides, faces: int, own_edge: IntArray) -> Winding:
     A surface with one side is left against itself somewhere, at joined edges rather than at the file's own.
     """
     edge, count = sides.edges
-    one, other = (side[count == 2] for side in sides.edge_ends)
+    shared = np.flatnonzero(count == 2)
+    one, other = (side[shared] for side in sides.edge_ends)
     a, b = sides.face[one], sides.face[other]
     differ = (sides.tail[one] == sides.tail[other]) & (a != b)
     if not differ.any():
@@ -99,9 +100,8 @@ def facing_inwards(points: FloatArray, sides: Sides, piece: IntArray, *, clockwi
     """
     count = int(piece.max(initial=-1)) + 1
     volume, area, holes = _capped(points, sides, piece, count)
-    edge, uses = sides.edges
     crowded = np.zeros(count, bool)
-    crowded[piece[sides.face[uses[edge] > 2]]] = True
+    crowded[piece[sides.face[sides.crowd > 2]]] = True
     least = np.where(holes > 0.0, _LEAST_VOLUME, _ROUNDING)
     solid = ~crowded & (holes <= NEARLY_CLOSED * area) & (np.abs(volume) > least * area**1.5)
     inwards = solid & ((volume > 0.0) if clockwise else (volume < 0.0))
@@ -120,22 +120,21 @@ def _capped(
     centre, volume, area = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
     face, tail = np.ascontiguousarray(sides.face), np.ascontiguousarray(sides.tail)
     volumes_of_pieces(points, face, tail, normal, piece, np.zeros(count), centre, volume, area)
-    of_side = piece[sides.face]
-    edge, uses = sides.edges
-    border = np.flatnonzero(uses[edge] == 1)
+    border = sides.open
     if not len(border):
         return volume / 6.0, area / 2.0, np.zeros(count)
+    of_border = piece[sides.face[border]]
     _, loop = connected_components(
         _graph(sides.tail[border], sides.head[border], np.ones(len(border)), len(points)), directed=False
     )
-    key, loop = np.unique(loop[sides.tail[border]] * count + of_side[border], return_inverse=True)
+    key, loop = np.unique(loop[sides.tail[border]] * count + of_border, return_inverse=True)
     loop = loop.reshape(-1)
     tails, heads = points[sides.tail[border]], points[sides.head[border]]
     size = np.bincount(loop, minlength=len(key))
     middle = np.stack([np.bincount(loop, tails[:, k], len(key)) / size for k in range(3)], axis=1)[loop]
     cap = np.cross(heads - middle, tails - middle)
-    volume += np.bincount(of_side[border], ((middle - centre[of_side[border]]) * cap).sum(axis=1), count)
-    return volume / 6.0, area / 2.0, np.bincount(of_side[border], np.linalg.norm(cap, axis=1), count) / 2.0
+    volume += np.bincount(of_border, ((middle - centre[of_border]) * cap).sum(axis=1), count)
+    return volume / 6.0, area / 2.0, np.bincount(of_border, np.linalg.norm(cap, axis=1), count) / 2.0
 
 
 def _with_their_shells(
