@@ -134,7 +134,8 @@ def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray
     object: of each finger the largest angle between the object's mean normal under its last bone that touches and
     those under bones of the thumb and under the palm; of all fingers the median. Nearly pi where they oppose, half
     of that for a hand that is laid along a thing or under it, though friction may hold it; 0 where only one side
-    touches. skin: (n, 3) posed, in the object's space; used: (D,) digits that take part."""
+    touches. Where neither thumb nor palm does and the thumb takes no part, fingers press against one another, as on
+    a cigarette. skin: (n, 3) posed, in the object's space; used: (D,) digits that take part."""
     found = Locator.of(mesh).closest(skin, max_distance=TOUCHES * hand.length)
     near = np.flatnonzero(found.found)
     normals = mesh.face_normals[found.points.faces[near]]
@@ -147,11 +148,18 @@ def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray
     means = sums / np.maximum(size, 1e-30)[:, None]
     other = [-1, *(range(hand.bones[hand.thumb], hand.bones[hand.thumb + 1]) if hand.thumb >= 0 else ())]
     against = means[[b for b in other if size[b] > 0.0]]
-    angles = []
-    for digit in np.flatnonzero(used):
-        touching = [b for b in range(hand.bones[digit], hand.bones[digit + 1]) if size[b] > 0.0]
-        if digit != hand.thumb and touching and len(against):
-            angles.append(float(np.arccos(np.clip((against @ means[touching[-1]]).min(), -1.0, 1.0))))
+    last = {
+        int(digit): means[touching[-1]]
+        for digit in np.flatnonzero(used)
+        if digit != hand.thumb
+        and (touching := [b for b in range(hand.bones[digit], hand.bones[digit + 1]) if size[b] > 0.0])
+    }
+    between = not len(against) and not (hand.thumb >= 0 and used[hand.thumb])
+    angles = [
+        float(np.arccos(np.clip((opposite @ normal).min(), -1.0, 1.0)))
+        for digit, normal in last.items()
+        if len(opposite := np.array([n for d, n in last.items() if d != digit]) if between else against)
+    ]
     return float(np.median(angles)) if angles else 0.0
 
 

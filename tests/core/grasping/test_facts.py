@@ -115,6 +115,21 @@ def test_a_flat_hand_on_a_plate_does_not_oppose_and_one_round_a_ball_does() -> N
     assert opposition(one, flat + 100.0 * one.length, mesh, used) == 0.0
 
 
+def test_two_fingers_that_hold_a_thing_between_them_oppose_where_the_thumb_takes_no_part() -> None:
+    one = hand()
+    flat, ball = skin(one.rig, one.rig.rest_world), meshes.icosphere(3)
+    first, second = (flat[one.skin_of_digits[d]] for d in (1, 2))
+    apart = np.linalg.norm(first[:, None] - second[None], axis=2)
+    apart[first @ one.frame[:, 1] < np.median(first @ one.frame[:, 1])] = np.inf  # by the outer half of the finger
+    a, b = np.unravel_index(apart.argmin(), apart.shape)
+    middle, radius = 0.5 * (first[a] + second[b]), 0.5 * apart[a, b]
+    held = TriangleMesh(middle + 1.02 * radius * ball.points, ball.faces)
+    used = np.isin(np.arange(len(one.bones) - 1), (1, 2))
+    assert opposition(one, flat, held, used) > np.radians(90.0)
+    used[one.thumb] = True
+    assert opposition(one, flat, held, used) == 0.0, "the thumb was to take part"
+
+
 def around(one: Hand, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """A few hands that come to the middle of a mesh, its middle below the fingers."""
     placed = np.tile(np.eye(4), (6, 1, 1))
