@@ -13,7 +13,7 @@ import numpy as np
 
 from contact_core.arrays import FloatArray, IntArray, frozen
 from contact_core.errors import InvalidInput, NotManifold
-from contact_core.geometry.exact_geodesics import log_map
+from contact_core.geometry.exact_geodesics import lowered_distances
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 
@@ -49,28 +49,36 @@ class StrokeField:
         """
         if not len(points):
             return replace(self, changed=np.zeros(0, np.int64))
-        used, tree = _vertices(self.mesh)
-        around = tree.query_ball_point(points.positions(self.mesh), self.reach * (1.0 + 1e-9))
-        near = used[np.unique(np.concatenate([np.asarray(some, np.int64) for some in around]))]
+        near, straight = self._around(points.positions(self.mesh))
         if not len(near):
             return replace(self, changed=near)
-        targets = SurfacePoints.at_vertices(self.mesh, near)
-        distance = self._distances(points, targets)
+        distance = self._distances(points, near, straight)
         lower = (distance < self.distances[near]) & (distance <= self.reach)
         distances = self.distances.copy()
         distances[near[lower]] = distance[lower]
         distances.setflags(write=False)
         return replace(self, distances=distances, changed=frozen(near[lower], np.int64, (None,), "changed"))
 
-    def _distances(self, points: SurfacePoints, targets: SurfacePoints) -> FloatArray:
-        """(k,) from points to targets over the surface; straight ones where it is broken."""
-        try:
-            return log_map(self.mesh, points, targets, max_distance=self.reach).distance
-        except NotManifold:
-            from scipy.spatial import cKDTree
+    def _around(self, positions: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The vertices (k,) within reach of positions (p, 3) in space, and how far they are from the nearest."""
+        used, tree = _vertices(self.mesh)
+        around = tree.query_ball_point(positions, self.reach * (1.0 + 1e-9), return_sorted=False)
+        parts = [np.asarray(some, np.int64) for some in around]
+        near = used[np.sort(parts[0]) if len(parts) == 1 else np.unique(np.concatenate(parts))]
+        at, squares = self.mesh.points[near], np.full(len(near), np.inf)
+        for position in positions:
+            away = at - position
+            np.minimum(squares, np.einsum("ij,ij->i", away, away), out=squares)
+        return near, np.sqrt(squares)
 
-            tree = cKDTree(points.positions(self.mesh))
-            return np.asarray(tree.query(targets.positions(self.mesh))[0])
+    def _distances(self, points: SurfacePoints, near: IntArray, straight: FloatArray) -> FloatArray:
+        """(k,) from points, or from what the stroke passed before, to vertices over the surface; straight ones
+        where it is broken. No path is shorter than the straight line, so most of what is behind is not sought."""
+        known = self.distances[near]
+        try:
+            return lowered_distances(self.mesh, points, near, known, self.reach, known > straight * (1.0 - 1e-9))
+        except NotManifold:
+            return straight
 
     def covered(self) -> IntArray:
         """The vertices (k,) within the radius of the stroke."""

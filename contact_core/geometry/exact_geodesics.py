@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import ComplexArray, FloatArray, IntArray
+from contact_core.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.kernel_arrays import Goal, Points, plain
 from contact_core.geometry.mesh import TriangleMesh
@@ -97,7 +97,6 @@ def log_map(
     component unless max_distance is given. Raises InvalidInput, and NotManifold where the search meets a place that
     is not.
     """
-    from contact_core.geometry import log_map_kernels as kernels
     from contact_core.geometry.path_kernels import read_chains, read_targets
 
     limit = _limit(max_distance)
@@ -110,21 +109,11 @@ def log_map(
     anchor, offsets = np.empty(count, np.int64), np.zeros(count + 1, np.int64)
     distance, headings = np.empty(count), np.empty(count, np.complex128)
     goal = _goal(mesh, targets, seek)
-    halfedges, starts, ends = plain(topology.halfedges), plain(sources.arrays), plain(targets.arrays)
+    halfedges, starts = plain(topology.halfedges), plain(sources.arrays)
     with Workspace.lent(mesh) as work:
         records = plain(work.targets(count))
-        while True:
-            labels = plain(work.labels)
-            status, element = kernels.search(
-                starts, ends, limit, halfedges, labels, plain(work.windows), plain(work.queue), records, goal
-            )
-            if status != kernels.NO_ROOM:
-                break
-            work.grow()
-        if status == kernels.MET_BLOCKED_EDGE:
-            raise topology.refuse_halfedge(element, "a log map")
-        if status == kernels.MET_BLOCKED_VERTEX:
-            raise topology.refuse_vertex(element, "a log map")
+        _search(topology, sources, targets, limit, work, records, goal)
+        labels = plain(work.labels)
         bends = read_targets(
             limit, anchor, distance, headings.view(np.float64).reshape(-1, 2), offsets,
             halfedges, labels, records, _NO_LINE,
@@ -144,6 +133,63 @@ def log_map(
     for array in (anchor, distance, coordinates, headings, first_leg, offsets, turning_angles, lengths):
         array.setflags(write=False)
     return LogMap(anchor, distance, coordinates, headings, first_leg, offsets, turning_angles, lengths, pops)
+
+
+def lowered_distances(
+    mesh: TriangleMesh,
+    sources: SurfacePoints,
+    vertices: IntArray,
+    known: FloatArray,
+    max_distance: float,
+    sought: BoolArray,
+) -> FloatArray:
+    """Distances (k,) of vertices (k,), without doubles, from earlier sources and further ones together.
+
+    known: (k,) exact distances from the earlier ones, inf where none lies within max_distance; every vertex within
+    max_distance of a further source is among them. sought: (k,) false where no further source can be nearer.
+
+    What no further source comes nearer to costs nothing: a window that an earlier path beats ends there, like one
+    that a path through a vertex beats (Xin and Wang 2009). Raises as log_map; what lies farther than max_distance
+    may stay as it was known.
+    """
+    topology, targets = Topology.of(mesh), SurfacePoints.at_vertices(mesh, vertices[sought])
+    require_on_surface(topology, sources, "sources")
+    require_on_surface(topology, targets, "targets")
+    with Workspace.lent(mesh) as work:
+        records, goal = plain(work.targets(len(targets))), _goal(mesh, targets, False)
+        _search(topology, sources, targets, _limit(max_distance), work, records, goal, (vertices, known))
+        return work.labels.reach[vertices, 1]
+
+
+def _search(
+    topology: Topology,
+    sources: SurfacePoints,
+    targets: SurfacePoints,
+    limit: float,
+    work: Workspace,
+    records: Any,
+    goal: Goal,
+    known: tuple[IntArray, FloatArray] | None = None,
+) -> None:
+    """Label the vertices and the targets' records in a workspace; refused where a place is not manifold.
+
+    known: vertices and the distances that they have already.
+    """
+    from contact_core.geometry import log_map_kernels as kernels
+
+    halfedges, starts, ends = plain(topology.halfedges), plain(sources.arrays), plain(targets.arrays)
+    while True:
+        if known is not None:
+            work.label(*known)
+        labels, windows, queue = plain(work.labels), plain(work.windows), plain(work.queue)
+        status, element = kernels.search(starts, ends, limit, halfedges, labels, windows, queue, records, goal)
+        if status != kernels.NO_ROOM:
+            break
+        work.grow()
+    if status == kernels.MET_BLOCKED_EDGE:
+        raise topology.refuse_halfedge(element, "a log map")
+    if status == kernels.MET_BLOCKED_VERTEX:
+        raise topology.refuse_vertex(element, "a log map")
 
 
 def exact_geodesic(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoints) -> Geodesic:

@@ -53,6 +53,15 @@ class Workspace:
         """A new epoch: whatever an earlier query wrote counts as empty."""
         self.labels = self.labels._replace(epoch=self.labels.epoch + 1.0)
 
+    def label(self, vertices: IntArray, distances: FloatArray) -> None:
+        """Give vertices (k,) the distances (k,) that an earlier query found, before this one begins.
+
+        They have no paths: only distances may be read from a query that began so.
+        """
+        reach = self.labels.reach
+        reach[vertices, 0], reach[vertices, 1] = self.labels.epoch, distances
+        self.labels.origin[vertices, 2] = 0
+
     def grow(self) -> None:
         """Four times the room, and a new epoch: the query that overflowed starts again from nothing."""
         self.begin()
