@@ -158,6 +158,6 @@ def as_seen(shown: DocumentGeometry, surface: str, root: Root) -> tuple[SurfaceP
 def heading_to(mesh: TriangleMesh, start: SurfacePoints, end: SurfacePoints) -> complex | None:
     """The unit heading in which the shortest geodesic leaves `start` for `end`; None where they are one place or
     not connected."""
-    log = log_map(mesh, start, end)
+    log = log_map(mesh, start, end, seek=True)
     leg = complex(log.coordinates[0])
     return leg / abs(leg) if log.anchor[0] >= 0 and abs(leg) > 1e-12 * mesh.bounding_box_diagonal else None

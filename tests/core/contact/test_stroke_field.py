@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from contact_core.contact.stroke_field import StrokeField
 from contact_core.errors import InvalidInput
 from contact_core.geometry.exact_geodesics import log_map
+from contact_core.geometry.fronts import spread_distances
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.testing import meshes
 from contact_core.testing.strategies import cached_family
@@ -48,3 +49,45 @@ def test_the_field_before_is_left_alone_and_a_radius_must_be_one() -> None:
     for radius in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(InvalidInput, match="positive"):
             StrokeField.begun(mesh, radius)
+
+
+@pytest.mark.parametrize("name", ["saddle", "torus", "holes"])
+def test_on_a_dense_mesh_the_preview_is_within_a_small_part_of_the_radius(name: str) -> None:
+    """The rim hardly moves when the stroke is let go."""
+    mesh, random = cached_family(name), np.random.default_rng(3)
+    for _ in range(2):
+        mesh = meshes.subdivided(mesh)
+    sources = SurfacePoints(random.integers(len(mesh.faces), size=4), random.dirichlet(np.ones(3), 4))
+    reach = 0.2 * mesh.bounding_box_diagonal
+    distances, lowered = spread_distances(mesh, sources, reach, np.full(len(mesh.points), np.inf))
+    used = np.unique(mesh.faces)
+    exact = log_map(mesh, sources, SurfacePoints.at_vertices(mesh, used)).distance
+    surely = used[exact < 0.97 * reach]
+    assert (
+        np.isin(surely, lowered).all()
+        and (np.isfinite(distances) == np.isin(np.arange(len(distances)), lowered)).all()
+    )
+    off = (distances[used] - exact)[exact < 0.97 * reach] / reach
+    assert np.abs(off).max() < 0.05 and np.abs(off).mean() < 0.002, (np.abs(off).max(), np.abs(off).mean())
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_fronts_are_exact_where_the_surface_is_flat(seed: int) -> None:
+    mesh, random = meshes.plane(24), np.random.default_rng(seed)
+    source = SurfacePoints(random.integers(len(mesh.faces), size=1), random.dirichlet(np.ones(3), 1))
+    distances, _ = spread_distances(
+        mesh, source, 10.0 * mesh.bounding_box_diagonal, np.full(len(mesh.points), np.inf)
+    )
+    straight = np.linalg.norm(mesh.points - source.positions(mesh), axis=1)
+    np.testing.assert_allclose(distances, straight, rtol=0, atol=1e-7 * mesh.bounding_box_diagonal)
+
+
+def test_a_dense_stroke_grows_by_what_is_new_and_many_waiting_vertices_find_room() -> None:
+    mesh = meshes.plane(160)
+    field = StrokeField.begun(mesh, 0.7 * mesh.bounding_box_diagonal)
+    first = field.extended(SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+    again = first.extended(SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+    assert len(first.changed) > 10_000 and not len(again.changed)
+    far = SurfacePoints([len(mesh.faces) - 1], [[0.2, 0.3, 0.5]])
+    both, other = first.extended(far), field.extended(far)
+    np.testing.assert_allclose(both.distances, np.minimum(first.distances, other.distances), rtol=0, atol=1e-6)
