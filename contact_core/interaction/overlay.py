@@ -88,7 +88,8 @@ class BrushRing:
 @dataclass(frozen=True, eq=False)
 class Ghost:
     """Something that is not there yet: a posed hand that is proposed, a copy before it is made. points: (n, 3)
-    world. triangles: (t, 3); a ghost without is drawn as dots. surface: which it is a ghost of."""
+    world. triangles: (t, 3); a ghost without is drawn as dots. surface: which it is a ghost of, and which hides it
+    where both are in one place."""
 
     points: FloatArray
     triangles: IntArray

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected
 from contact_core.interaction.live import body_terms
 from contact_core.interaction.overlay import Ghost, Overlay
+from contact_core.interaction.seen import SeenScene, SeenSurface
 from contact_core.interaction.work import Worker
 from contact_core.plugins.registry import GRASP_SAMPLERS
 from contact_core.progress import Progress
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from contact_core.proposals.proposal import Proposal, SolveSettings
 
 _GHOST = (0.55, 0.75, 1.0)
+_COINCIDES = 0.01  # of the surface's diagonal: a ghost that is so near to what it is the ghost of is not drawn
 _SUGGEST = "Suggest"
 Find = Callable[[ContactDocument, Draft, "SolveSettings"], "Proposal"]
 
@@ -35,6 +39,9 @@ class Proposing:
         self._desk, self._worker = desk, worker
         self.proposal: Proposal | None = None
         self.suggestions: tuple[Suggestion, ...] = ()  # found so far, in the order in which they came
+        self._drawn: tuple[SeenScene, ContactDocument, Overlay] | None = (
+            None  # what it was made of, and what is shown
+        )
 
     @property
     def summary(self) -> str:
@@ -225,16 +232,27 @@ class Proposing:
 
     def forget(self) -> None:
         """The document moved on: what was proposed for another is nothing now."""
-        self.proposal, self._desk.ghost, self.suggestions = None, None, ()
+        self.proposal, self._desk.ghost, self.suggestions, self._drawn = None, None, (), None
 
     def overlay(self) -> Overlay:
         """The hand as it was, behind the one that is proposed."""
         if self.proposal is None:
             return Overlay()
         session, desk = self._desk.session, self._desk
-        before = desk.scene.following(desk.base, session.derived.known_meshes, session.rigs, desk.hidden)
-        moved = before.moved_since(desk.scene) & before.surfaces.keys()
-        return Overlay(ghosts=tuple(
-            Ghost(before.surfaces[name].points, before.surfaces[name].mesh.faces, _GHOST, surface=name)
-            for name in sorted(moved)
-        ))  # fmt: skip
+        if self._drawn is None or self._drawn[0] is not desk.scene or self._drawn[1] is not desk.base:
+            before = desk.scene.following(desk.base, session.derived.known_meshes, session.rigs, desk.hidden)
+            moved = sorted(before.moved_since(desk.scene) & before.surfaces.keys())
+            ghosts = (ghost_of(before.surfaces[name], desk.scene.surfaces.get(name)) for name in moved)
+            self._drawn = desk.scene, desk.base, Overlay(ghosts=tuple(ghost for ghost in ghosts if ghost))
+        return self._drawn[2]
+
+
+def ghost_of(before: SeenSurface, now: SeenSurface | None) -> Ghost | None:
+    """What a surface was before, without the faces that hardly moved: there two skins would show in patches, each
+    through the other. None where all of it stayed."""
+    points, faces = before.points, before.mesh.faces
+    if now is not None and len(now.points) == len(points):
+        away = np.linalg.norm(now.points - points, axis=1)
+        nearest = _COINCIDES * before.scale * before.rest.bounding_box_diagonal
+        faces = faces[(away[faces] > nearest).any(axis=1)]
+    return Ghost(points, faces, _GHOST, surface=before.name) if len(faces) else None

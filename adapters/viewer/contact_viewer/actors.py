@@ -151,12 +151,10 @@ class FillActor:
         self._normals: Normals
         self._face, self._rim = Polygons(), Polygons()
         self._actors = []
-        for polygons, units in ((self._face, -60.0), (self._rim, -110.0)):
+        for polygons in (self._face, self._rim):
             mapper = vtkPolyDataMapper()
             mapper.SetInputData(polygons.data)
             mapper.SetResolveCoincidentTopologyToPolygonOffset()
-            mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-2.5, units)
-            mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2.5, units)
             mapper.ScalarVisibilityOff()
             actor = vtkActor()
             actor.SetMapper(mapper)
@@ -182,12 +180,21 @@ class FillActor:
         self._face.set_points(fill.points)
         self._face.set_normals(self._normals.at(fill.points))
         self._rim.set_points(fill.points[self._ends.ravel()])
+        self._order(in_front=isinstance(fill, Decal) or fill.surface is None)
         chosen = isinstance(fill, Decal) and fill.selected
         face, rim = (actor.GetProperty() for actor in self._actors)
         face.SetColor(*fill.color)
         face.SetOpacity(fill.opacity)
         rim.SetColor(*((1.0, 1.0, 1.0) if chosen else darker(fill.color)))
         rim.SetLineWidth((2.6 if chosen else 1.6) * ratio)
+
+    def _order(self, *, in_front: bool) -> None:
+        """Win over a surface in the same place, or be hidden by it."""
+        sign = -1.0 if in_front else 1.0
+        for actor, units in zip(self._actors, (60.0, 110.0), strict=True):
+            mapper = actor.GetMapper()
+            mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(sign * 2.5, sign * units)
+            mapper.SetRelativeCoincidentTopologyLineOffsetParameters(sign * 2.5, sign * units)
 
     def remove(self) -> None:
         """Draw it no more."""

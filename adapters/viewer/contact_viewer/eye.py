@@ -15,6 +15,7 @@ from contact_core.arrays import FloatArray
 FIELD_OF_VIEW = 30.0  # degrees, of the height: little perspective, as a portrait lens has
 _TURN = 0.4  # degrees for a pixel of an image that is not magnified
 _STEP = 1.15  # a notch of the wheel
+_NEAREST, _FARTHEST = 0.002, 20.0  # of the scene's diagonal, from what is looked at: beyond, nothing is recognised
 _STEEPEST = 89.0  # degrees above the horizon: beyond, left and right change places
 
 
@@ -121,14 +122,28 @@ class Eye:
         self._place(self.eye + shift, focus + shift)
 
     def zoom(self, notches: float, pixel: Any = None) -> None:
-        """Go nearer by notches of the wheel, towards what is under a pixel; straight ahead without one."""
-        factor = _STEP ** -float(np.clip(notches, -20, 20))
+        """Go nearer by notches of the wheel, towards what is under a pixel; straight ahead without one.
+
+        Not beyond what the scene's size makes sense of, but always back from there.
+        """
         focus = np.array(self._camera.GetFocalPoint())
+        factor = self._within(_STEP ** -float(np.clip(notches, -20, 20)), float(np.linalg.norm(self.eye - focus)))
         towards = focus
         if pixel is not None:
             origin, direction = (part[0] for part in self.rays([pixel]))
             towards = origin + direction * ((focus - origin) @ self.direction) / (direction @ self.direction)
         self._place(towards + factor * (self.eye - towards), towards + factor * (focus - towards))
+
+    def _within(self, factor: float, distance: float) -> float:
+        """The factor to go away by, from a distance to what is looked at, so that the scene is neither lost nor
+        passed through."""
+        low, high = np.reshape(self._renderer.ComputeVisiblePropBounds(), (3, 2)).T
+        diagonal = float(np.linalg.norm(high - low))
+        if (high < low).any() or diagonal == 0.0:  # nothing is there
+            return factor
+        if factor > 1.0:
+            return min(factor, max(_FARTHEST * diagonal / distance, 1.0))
+        return max(factor, min(_NEAREST * diagonal / distance, 1.0))
 
     def look_from(self, side: str) -> None:
         """Look from a side, at what it looks at now: default, front, right, top, or back, left, bottom."""

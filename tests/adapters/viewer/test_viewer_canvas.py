@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contact_core.interaction.events import Pointer
-from contact_core.interaction.overlay import AxisLine, Decal, Handle, Label, Overlay, StrokeTint
+from contact_core.interaction.overlay import AxisLine, Decal, Ghost, Handle, Label, Overlay, StrokeTint
 from contact_core.interaction.view import View
 from contact_core.testing.meshes import icosphere
 
@@ -99,6 +99,16 @@ def test_a_filled_contact_lies_on_its_surface_and_not_through_it(canvas: Canvas,
     assert seen.sum() > 300 and inside.mean() > 0.6  # filled, without holes where the surface would win
     eye.look_from("back")
     assert not colored(canvas.image(), RED).any()
+
+
+def test_a_ghost_in_the_place_of_its_surface_is_hidden_and_one_beside_it_is_seen(canvas: Canvas, eye: Eye) -> None:
+    ball = icosphere(3)
+    canvas.show(Overlay(ghosts=(Ghost(ball.points, ball.faces, GREEN, 1.0, "ball"),)))
+    inside = np.zeros(SIZE[::-1], bool)
+    inside[SIZE[1] // 2 - 40 : SIZE[1] // 2 + 40, SIZE[0] // 2 - 40 : SIZE[0] // 2 + 40] = True
+    assert not colored(canvas.image(), GREEN)[inside].any()
+    canvas.show(Overlay(ghosts=(Ghost(1.1 * ball.points, ball.faces, GREEN, 1.0, "ball"),)))
+    assert colored(canvas.image(), GREEN)[inside].all()
 
 
 def test_lines_show_faintly_through_what_hides_them(canvas: Canvas, eye: Eye) -> None:
@@ -204,6 +214,31 @@ def test_the_camera_moves_as_the_pointer_does(eye: Eye) -> None:
         navigation.handle(event, eye)
     np.testing.assert_allclose(eye.project([focus])[0, :2], middle, atol=0.5)
     assert not navigation.is_dragging
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e4])
+def test_a_zoom_ends_before_the_scene_is_lost_and_leads_back(size: float) -> None:
+    """However often the wheel turns: something of the scene is some pixels large, and the way back is as long."""
+    canvas = Canvas(off_screen_window(SIZE))
+    ball = icosphere(2)
+    canvas.surface("ball").set_shape(size * ball.points, ball.faces)
+    eye = canvas.eye
+    eye.look_from("front")
+    eye.fit(size * ball.points)
+    fitted = np.linalg.norm(eye.eye)
+    for _ in range(200):
+        eye.zoom(-1.0)
+    pixels = eye.project(size * ball.points)[:, :2]
+    assert 8.0 < np.ptp(pixels[:, 1]) < 0.2 * SIZE[1]
+    farthest = np.linalg.norm(eye.eye)
+    eye.zoom(1.0)
+    assert np.linalg.norm(eye.eye) == pytest.approx(farthest / 1.15)
+    for _ in range(400):
+        eye.zoom(1.0)
+    nearest = np.linalg.norm(eye.eye)
+    assert 1e-3 * size < nearest < 0.01 * fitted
+    eye.zoom(-1.0)
+    assert np.linalg.norm(eye.eye) == pytest.approx(1.15 * nearest)
 
 
 def test_everything_that_is_fitted_is_seen(eye: Eye) -> None:

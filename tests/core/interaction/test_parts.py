@@ -20,6 +20,8 @@ from contact_core.geometry.raycast import Locator
 from contact_core.grasping import filled
 from contact_core.interaction.events import Key, Pointer
 from contact_core.interaction.live import KeptContacts
+from contact_core.interaction.proposing import ghost_of
+from contact_core.interaction.seen import SeenSurface
 from contact_core.interaction.view import Perspective, View, on_plane, world_per_pixel
 from contact_core.interaction.work import Worker
 from contact_core.plugins.registry import TOOLS
@@ -27,7 +29,7 @@ from contact_core.progress import Progress
 from contact_core.scene.problem import problem_of
 from contact_core.solve.penetration import PenetrationTerm
 from contact_core.solve.terms import paper_terms
-from contact_core.testing import rigs
+from contact_core.testing import meshes, rigs
 from contact_core.testing.artist import Artist, ball_and_hand, paired, shifted
 
 # -- views and events ----------------------------------------------------------------------------------------------
@@ -205,6 +207,23 @@ def solved(artist: Artist) -> None:
     artist.hands.advance()
 
 
+@given(st.floats(0.0, 2.0), st.floats(0.1, 10.0))
+def test_a_ghost_is_of_what_moved_and_of_nothing_else(angle: float, size: float) -> None:
+    """Two skins nearly in one place would show in patches, each through the other."""
+    rest, world = meshes.icosphere(2), np.diag([size, size, size, 1.0])
+    turned = rest.points.copy()
+    tip = turned[:, 2] > 0.5  # bent about the first axis from here on
+    turned[tip, 1] += math.sin(angle) * (turned[tip, 2] - 0.5)
+    before = SeenSurface("ball", rest, rest, world)
+    now = SeenSurface("ball", rest, rest.with_points(turned), world)
+    ghost, moved = ghost_of(before, now), np.linalg.norm(turned - rest.points, axis=1)
+    shown = np.zeros((0, 3), np.int64) if ghost is None else ghost.triangles
+    far = moved > 0.01 * rest.bounding_box_diagonal
+    assert far[shown].any(axis=1).all() and set(np.flatnonzero(far)) <= set(shown.ravel())
+    whole = ghost_of(before, None)
+    assert whole is not None and len(whole.triangles) == len(rest.faces)
+
+
 def test_a_solve_beside_the_window_is_a_ghost_until_it_is_accepted() -> None:
     artist = paired()
     before = artist.session.document
@@ -213,6 +232,7 @@ def test_a_solve_beside_the_window_is_a_ghost_until_it_is_accepted() -> None:
     assert artist.session.document is before and artist.hands.desk.document is not before, artist.hands.status
     assert artist.hands.overlay().ghosts and "Enter" in artist.hands.status.line()
     assert artist.hands.desk.scene.surfaces["hand"].pose is not None
+    assert artist.hands.overlay().ghosts is artist.hands.overlay().ghosts, "made once"
     artist.key("Escape")
     assert artist.hands.desk.document is before and artist.hands.desk.scene.surfaces["hand"].pose is None
     artist.key("Space")
