@@ -103,14 +103,14 @@ def add_files(session: Session, sources: Iterable[str | Path]) -> dict[str, tupl
     """Bring further meshes and rigs into the scene of a session, each beside what is there; the new surfaces, with
     what their readers say of them.
 
-    Raises FileRefused, also where the scene is none that takes files.
+    All are read before the first is added: of several of which one cannot be read none comes in. Raises
+    FileRefused, also where the scene is none that takes files.
     """
     host = session.host
     if not isinstance(host, ViewerHost):
         raise FileRefused("this scene belongs to another program: add the object there, and open it again.")
     added = {}
-    for source in sources:
-        asset = read_asset(str(source), session.plugins)
+    for asset in [read_asset(str(source), session.plugins) for source in sources]:
         reach = _reach(session)
         place, _ = _beside(asset, reach, host.space())
         key = host.add(asset, place)

@@ -319,6 +319,40 @@ def test_trouble_is_a_sentence_in_the_page(browser: Any, served: Served) -> None
 
 
 @pytest.mark.slow
+def test_suggestions_are_looked_for_stopped_chosen_and_undone(browser: Any, tmp_path: Path) -> None:
+    """Shift+G: progress, Cancel, which keeps what was found; another by Down, kept by the button, taken back."""
+    with serving(tmp_path, "sample:human_hand", "sample:mug") as made:
+        page = Page.opened(browser, made.address, size=(1280, 720))
+        before = page.state("tree")
+        page.key("Shift+G")
+        page.until("() => trame.state.get('work') && trame.state.get('work').title === 'Suggest'")
+        page.page.locator("button:has-text('Cancel')").click()
+        page.until("() => !trame.state.get('work')")
+        assert page.state("tree") == before and not page.state("proposed"), page.state("line")
+        page.key("Shift+G")
+        page.until("() => / of [2-9]/.test(trame.state.get('line')) && trame.state.get('work')")
+        bar = page.page.locator(".v-app-bar").bounding_box()
+        for button in page.page.locator(".v-app-bar button").all():  # nothing is cut off
+            box = button.bounding_box()
+            assert box is None or box["x"] + box["width"] <= bar["x"] + bar["width"], button.get_attribute("title")
+        page.page.locator("button:has-text('Cancel')").click()
+        page.until("() => !trame.state.get('work')")
+        assert "grasp 1 of" in page.state("line")
+        page.key("ArrowDown")
+        page.until("() => trame.state.get('line').includes('grasp 2 of')")
+        page.page.locator("button:has-text('Keep')").click()
+        page.until("() => !trame.state.get('proposed')")
+        kept = len(page.state("tree"))
+        assert kept > len(before)
+        page.key("Control+z")
+        page.until(f"() => trame.state.get('tree').length === {len(before)}")
+        page.key("Control+y")
+        page.until(f"() => trame.state.get('tree').length === {kept}")
+        assert page.errors == []
+        page.page.close()
+
+
+@pytest.mark.slow
 def test_keys_in_a_field_of_text_are_text(browser: Any, served: Served) -> None:
     page = Page.opened(browser, served.address)
     second = Page.opened(browser, served.address)

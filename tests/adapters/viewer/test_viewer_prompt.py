@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -60,6 +61,64 @@ def test_open_save_export_and_drop(hand: Hand, tmp_path: Path) -> None:
         hand.front.tick()
         assert says in app.line(), name
     assert len(app.session.document.surfaces) == 3
+
+
+BOOK = (
+    "".join(  # three pages that share their spine: an edge of three faces
+        f"v {x} {y} {z}\n" for x, z in ((0, 0), (0.06, 0), (-0.03, 0.05), (-0.03, -0.05)) for y in (0, 0.08)
+    )
+    + "f 1 2 4 3\nf 1 2 6 5\nf 1 2 8 7\n"
+)
+
+
+def open_by_prompt(hand: Hand, name: str) -> None:
+    """Ctrl+O, the name, Enter."""
+    hand.key("Ctrl+O")
+    assert hand.front.prompt is not None
+    while hand.front.prompt.text:
+        hand.event("KeyPressEvent", symbol="BackSpace")
+    typed(hand, name)
+    hand.key("Enter")
+    assert hand.front.prompt is None
+
+
+def test_what_cannot_be_read_is_a_sentence_and_the_next_name_may_be_typed(hand: Hand, tmp_path: Path) -> None:
+    """Each is told by its name; session, document and tool stay, and a good file comes in after all of them."""
+    app = hand.app
+    session, document, tool = app.session, app.session.document, app.interaction.tool
+    (tmp_path / "cut.glb").write_bytes(b"glTF\x02\x00\x00\x00\x00\x10\x00\x00")
+    (tmp_path / "mess.glb").write_bytes(bytes(range(256)))
+    (tmp_path / "words.obj").write_text("this is no mesh")
+    (tmp_path / "things").mkdir()
+    (tmp_path / "book.obj").write_text(BOOK)
+    told = {
+        "none.glb": "cannot be read",
+        "nowhere/none.obj": "cannot be read",
+        "things": "folder",
+        "cut.glb": "damaged",
+        "mess.glb": "damaged",
+        "words.obj": "words.obj",
+    }
+    for name, says in told.items():
+        open_by_prompt(hand, name)
+        line = app.line()
+        assert says in line and Path(name).name in line and "Traceback" not in line, line
+        assert app.session is session and session.document is document and app.interaction.tool == tool
+    open_by_prompt(hand, "book.obj;none.glb")  # one of two
+    assert "none.glb" in app.line() and session.document is document, app.line()
+    open_by_prompt(hand, "book.obj")
+    assert "book" in session.document.surfaces, app.line()
+
+
+def test_a_file_that_may_not_be_read_is_a_sentence(hand: Hand, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.obj"
+    secret.write_text(BOOK)
+    secret.chmod(0)
+    if os.access(secret, os.R_OK):
+        pytest.skip("whoever runs the tests may read every file")
+    before = hand.app.session.document
+    open_by_prompt(hand, "secret.obj")
+    assert "secret.obj" in hand.app.line() and hand.app.session.document is before
 
 
 def test_escape_and_nothing_leave_everything_as_it_is(hand: Hand) -> None:

@@ -79,7 +79,8 @@ def _button(v3: Any, icon: str, tip: str, **attributes: Any) -> None:
 
 
 def _top(v3: Any, html: Any) -> None:
-    with v3.VAppBar(height=44, flat=True, color="surface", border="b"):
+    busy = ("work || proposed ? 'contact-busy' : ''",)
+    with v3.VAppBar(height=44, flat=True, color="surface", border="b", classes=busy):
         html.Div(
             "{{ title }}",
             style="padding: 0 8px 0 14px; font-weight: 500; max-width: 210px;",
@@ -156,7 +157,7 @@ def _top(v3: Any, html: Any) -> None:
             ),
         ):
             v3.VBtn(
-                label, prepend_icon=icon, size="small", classes="text-none mx-1 px-2", title=tip,
+                label, prepend_icon=icon, size="small", classes="contact-toggle text-none mx-1 px-2", title=tip,
                 variant=(f"{name} ? 'tonal' : 'text'",), color=(f"{name} ? 'primary' : undefined",),
                 click=f"trigger('act', ['{action}'])",
             )  # fmt: skip
