@@ -45,6 +45,7 @@ class Grasp:
         from contact_core.cli.library import library_of
         from contact_core.grasp_files.grasp import grasp
         from contact_core.grasping.searching import GraspSettings
+        from contact_core.grasping.verdict import told_through
 
         like = None
         if arguments.like is not None:
@@ -64,7 +65,7 @@ class Grasp:
                 str(place + 1),
                 one.kind,
                 f"{one.score:.2f}",
-                "; ".join(one.verdict.failures),
+                "; ".join(filter(None, (told_through(one.facts.metrics), *one.verdict.failures))),
             )
             for place, one in enumerate(result.grasps)
         ]

@@ -28,7 +28,7 @@ from contact_core.grasping.scene import GraspScene
 from contact_core.grasping.searching import GraspSettings
 from contact_core.grasping.suggest import suggest
 from contact_core.grasping.verbs import grasp_scene
-from contact_core.grasping.verdict import DEFINITIONS, spell
+from contact_core.grasping.verdict import DEFINITIONS, spell, told_through
 from contact_core.hands.description import HandWords
 from contact_core.job.standing import object_mesh
 from contact_core.library.like import suggest_like
@@ -207,7 +207,8 @@ def _picture(scene: GraspScene, one: Suggestion, place: int, side: int, row: int
     lift = lift * (1.0 if lift @ up >= 0 else -1.0)
     eye: FloatArray = across + 0.35 * one.way + 0.25 * lift if side == 0 else -across - 0.45 * one.way + 0.3 * lift
     word = "" if one.is_grasp else " - NOT good"
-    caption = f"{place}. {one.kind}{word}" if side == 0 else f"   {spell('gap', one.facts.metrics['gap'])} gap"
+    beside = f"{spell('gap', one.facts.metrics['gap'])} gap {told_through(one.facts.metrics)}".rstrip()
+    caption = f"{place}. {one.kind}{word}" if side == 0 else f"   {beside}"
     return Picture(
         meshes=(PictureMesh(one.skin, SKIN), PictureMesh(scene.mesh, THING)),
         camera_from=tuple(eye.tolist()), caption=caption, focus=np.concatenate([seen, near]), row=row,
@@ -256,6 +257,7 @@ def _entry(one: Suggestion, place: int) -> dict[str, Any]:
         "kind": one.kind,
         "verdict": "grasp" if one.is_grasp else "bad",
         "failures": list(one.verdict.failures),
+        "through": told_through(one.facts.metrics),
         "score": one.score,
         "closure": one.facts.closure,
         "comfort": one.facts.comfort,

@@ -147,6 +147,12 @@ def judge_hold(metrics: Mapping[str, Any], kind: str) -> tuple[str, ...]:
     return tuple(failures)
 
 
+def told_through(metrics: Mapping[str, Any]) -> str:
+    """Which digits go through a loop, in words; empty where none does."""
+    loops = {0: "", 1: "the loop"}.get(metrics["loops_held"], f"{metrics['loops_held']} loops")
+    return f"through {loops}: {', '.join(metrics['through_loop'])}" if loops else ""
+
+
 def floor(limits: Mapping[str, float], metrics: Mapping[str, Any], kind: str) -> float:
     """Of closure or opposition. Fingers through a loop are round it and cannot lose it, however slippery it is and
     wherever the thumb lies, on top of a handle for instance."""

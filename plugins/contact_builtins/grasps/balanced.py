@@ -43,7 +43,7 @@ class Balanced(HasSettings):
             value -= self.along * m["thumb_along"]
         if not facts.failures:
             value -= self.margin * (1.0 - facts.margin)
-        value += self.loop * min(m["digits_through"] - thumb, 4)
+            value += self.loop * min(m["digits_through"] - thumb, 4)
         if thumb:  # as scissors are held, or in the way of the fingers
             value += self.scissors if m["loops_held"] > 1 else -self.loop
         return float(value + self.clearance * facts.clearance - FAILURE * len(facts.failures))

@@ -21,7 +21,7 @@ from contact_core.grasping.facts import (
 )
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.slots import KINDS
-from contact_core.grasping.verdict import judge_hold, margin
+from contact_core.grasping.verdict import judge_hold, margin, told_through
 from contact_core.rig.rig import forward_kinematics, skin
 from contact_core.testing import meshes
 from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
@@ -172,6 +172,12 @@ def test_a_good_hold_has_no_failure_and_each_fault_is_named(kind: str) -> None:
         assert "hold" in judge_hold(slips, kind)[0] and "laid on" in judge_hold(slips, kind)[1]
         assert len(judge_hold({**slips, "digits_through": 1}, kind)) == 2
         assert judge_hold({**slips, "digits_through": 2}, kind) == (), "two fingers through a loop cannot lose it"
+
+
+def test_what_goes_through_loops_is_told_in_words() -> None:
+    assert told_through({"loops_held": 0, "through_loop": []}) == ""
+    assert told_through({"loops_held": 1, "through_loop": ["index", "middle"]}) == "through the loop: index, middle"
+    assert told_through({"loops_held": 2, "through_loop": ["thumb", "index"]}) == "through 2 loops: thumb, index"
 
 
 def test_along_is_the_way_of_a_rod_and_no_way_on_a_plate_or_a_ball() -> None:
