@@ -234,8 +234,10 @@ class Lesson:
         return at + lift * normals, normals
 
     def overlay(self) -> Overlay:
-        """The mark, to be drawn over the scene; nothing while a gesture is under way."""
-        shown = None if self._interaction.is_busy else self.marked()
+        """The mark, to be drawn over the scene; nothing while a gesture is under way, nor on a pose that is only
+        proposed, which has places of its own."""
+        waits = self._interaction.is_busy or self._interaction.proposing.proposal is not None
+        shown = None if waits else self.marked()
         if shown is None or self.number in self._done:
             return Overlay()
         points = shown[0]

@@ -20,7 +20,7 @@ from contact_core.grasping.judging import verdict
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.lesson import STEPS, Lesson
 from contact_core.interaction.view import Perspective
-from contact_core.plugins.registry import TOOLS
+from contact_core.plugins.registry import GRASP_SAMPLERS, TOOLS
 from contact_core.testing.artist import Artist, ball_and_hand, block, shifted
 
 MUG = np.array([0.14811, 0.0, 0.0])  # where it stands, beside the hand
@@ -77,6 +77,20 @@ def newcomer() -> Iterator[Newcomer]:
     with contact.new(hand="sample:human_hand", mug="sample:mug") as session:
         session.surfaces.place("mug", shifted(*MUG))
         yield Newcomer(session, Interaction(session), FRONT)
+
+
+def test_a_pose_that_is_only_proposed_bears_no_mark(newcomer: Newcomer) -> None:
+    """Marks are places of the hand at rest: on another pose they would lie anywhere."""
+    lesson, hands = Lesson(newcomer.hands), newcomer.hands
+    hands.desk.view = newcomer.view
+    assert lesson.overlay().axes
+    hands.set(suggestions=1)
+    hands.configure(GRASP_SAMPLERS, "around", places=30, most=160)
+    newcomer.key("Shift+G")
+    assert hands.proposing.proposal is not None, hands.status
+    assert not lesson.overlay().axes and not lesson.overlay().labels
+    newcomer.key("Escape")
+    assert lesson.overlay().axes
 
 
 def keys_of(lesson: Lesson, step: str) -> list[str]:
