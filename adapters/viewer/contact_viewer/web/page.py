@@ -305,7 +305,7 @@ def _field(html: Any) -> None:
 
 def _dialogs(v3: Any, html: Any) -> None:
     with v3.VDialog(v_model=("help_wanted", False), max_width=1480, width="92vw"), v3.VCard(title="Keys"):
-        with v3.VCardText(style="max-height: 70vh;", classes="contact-scroll"):
+        with v3.VCardText(style="max-height: calc(100vh - 130px);", classes="contact-scroll"):
             with html.Div(v_for="group in help_groups", key=("group.name",)):
                 html.Div("{{ group.name }}", classes="contact-head px-0")
                 with (
