@@ -14,8 +14,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.distance_field import DistanceField
-from contact_core.solve.body import PairedPoints
+from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.penetration import PenetrationTerm, Solid
 from contact_core.solve.problem import PoseProblem
 
@@ -36,18 +37,39 @@ def filled(open_field: DistanceField, radius: float) -> DistanceField:
     return DistanceField(open_field.origin, open_field.spacing, np.where(closed > 0.0, open_field.values, closed))
 
 
+def beyond(whole: DistanceField, part: DistanceField) -> DistanceField:
+    """A field of all of an object with nothing solid where a finer one of a part is, so that the lesser of both is
+    right everywhere; both in one space. It is wider by a cell, by which a coarse field may be off."""
+    low = np.floor((part.origin - whole.origin) / whole.spacing).astype(int)
+    high = np.ceil((part.origin - whole.origin + part.spacing * (np.array(part.values.shape) - 1)) / whole.spacing)
+    values = whole.values - whole.spacing
+    known = tuple(slice(max(a, 0), max(b + 1, 0)) for a, b in zip(low, high.astype(int), strict=True))
+    values[known] = np.maximum(values[known], whole.spacing)
+    return DistanceField(whole.origin, whole.spacing, values)
+
+
 @dataclass(frozen=True, eq=False)
 class KeepOutTerm(PenetrationTerm):
-    """Penetration by fields that are given, by rigid body, in its surface units and space."""
+    """Penetration by fields that are given, one or more by rigid body, in its surface units and space: skin keeps
+    out of each of them. stand_in: by skinned body the vertices (k,) that are looked at, and their areas (k,)."""
 
-    fields: dict[str, DistanceField] = field(default_factory=dict)
+    fields: dict[str, tuple[DistanceField, ...]] = field(default_factory=dict)
+    stand_in: dict[str, tuple[IntArray, FloatArray]] = field(default_factory=dict)
+
+    def samples_of(self, body: Body) -> tuple[IntArray, FloatArray]:
+        """The vertices that are given, else some of all."""
+        return self.stand_in.get(body.name) or super().samples_of(body)
 
     def solids_in(self, problem: PoseProblem) -> dict[str, Solid]:
         """The solids of the problem with the given fields."""
         solids = super().solids_in(problem)
         for name, given in self.fields.items():
-            size = given.spacing * (np.array(given.values.shape) - 1)
-            solids[name] = replace(solids[name], fields=(given,), low=given.origin, high=given.origin + size)
+            low = np.min([each.origin for each in given], axis=0)
+            ends = [each.origin + each.spacing * (np.array(each.values.shape) - 1) for each in given]
+            mesh, *_ = solids[name].meshes
+            solids[name] = replace(
+                solids[name], meshes=(mesh,) * len(given), fields=given, low=low, high=np.max(ends, axis=0)
+            )
         return solids
 
 

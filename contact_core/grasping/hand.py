@@ -123,6 +123,11 @@ class Hand:
         owner = rig.skin_joints[np.arange(len(rig.skin_joints)), rig.skin_weights.argmax(axis=1)]
         return np.flatnonzero(_below(rig, np.array([self.description.hub]))[owner])
 
+    @property
+    def is_in_body(self) -> bool:
+        """Whether most of the rig's skin is another's than palm's and digits'."""
+        return 2 * len(self.own_skin) < len(self.rig.surface.points)
+
     def angles_of(self, pose: Pose) -> FloatArray:
         """(B,) by how much each bone is bent about its axis in a pose of the rig."""
         order = [pose.joints.index(self.rig.joints[joint]) for joint in self.joints]

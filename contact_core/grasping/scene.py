@@ -9,18 +9,21 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from contact_core.arrays import FloatArray
+from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.document import ContactDocument
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
-from contact_core.grasping.filled import KeepOutTerm, filled
+from contact_core.geometry.transform import transform_points
+from contact_core.grasping.filled import KeepOutTerm, beyond, filled
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.loops import Loop, loops_near
 from contact_core.plugins.registry import POSE_TERMS
 from contact_core.proposals.proposal import AGAIN, SolveSettings
+from contact_core.rig.poses import posed_points
 from contact_core.rig.rig import Pose
 from contact_core.scene.problem import Objective, world_from_surface
 from contact_core.solve.body import manipulator_length, uniform_scale
+from contact_core.solve.penetration import thinned, thinned_among
 from contact_core.solve.solver import SolveOptions
 from contact_core.solve.terms import PoseTerm, paper_terms
 
@@ -35,6 +38,7 @@ NODES = 1_500_000  # of the field, at most
 NEAR_CELL, NEAR_ROOM = 0.02, 0.12  # hand lengths: of a field round one hand, and how far beyond its skin it goes
 FILLED = 0.2  # hand lengths: what a ball of this radius does not reach is filled
 PENETRATION = 16.0
+ON_HAND, ON_REST = 1200, 300  # vertices that stand for the skin of a hand, and of the body that it is on
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,15 +124,42 @@ class GraspScene:
         part = DistanceField.within(self.mesh, skin.min(axis=0) - room, skin.max(axis=0) + room, fine)
         return part or self.field
 
-    def terms(self, kept: DistanceField) -> tuple[PoseTerm, ...]:
+    @cached_property
+    def samples(self) -> tuple[IntArray, FloatArray]:
+        """The vertices (k,) that stand for the skin, and the area (k,) of each: of a body most are on its hand."""
+        surface, own = self.rig.surface, self.hand.own_skin
+        if not self.hand.is_in_body:
+            return thinned(surface, ON_HAND + ON_REST)
+        rest = np.setdiff1d(np.arange(len(surface.points)), own)
+        parts = thinned_among(surface, own, ON_HAND), thinned_among(surface, rest, ON_REST)
+        return np.concatenate([v for v, _ in parts]), np.concatenate([a for _, a in parts])
+
+    def terms(self, kept: DistanceField, closed: Pose) -> tuple[PoseTerm, ...]:
         """The paper's, depth in what is kept out of, and self-collision where a plugin offers it."""
         result: tuple[PoseTerm, ...] = paper_terms()
+        fields = (kept, beyond(self.field, kept)) if self._reaches_beyond(kept, closed) else (kept,)
         scale = uniform_scale_of(self)
-        own = DistanceField(kept.origin / scale, kept.spacing / scale, kept.values / scale)
-        result += (KeepOutTerm(weight=PENETRATION, resolution=48, fields={self.object_name: own}),)
+        own = tuple(
+            DistanceField(each.origin / scale, each.spacing / scale, each.values / scale) for each in fields
+        )
+        keep_out = KeepOutTerm(
+            weight=PENETRATION,
+            resolution=48,
+            fields={self.object_name: own},
+            stand_in={self.hand_name: self.samples},
+        )
+        result += (keep_out,)
         if "self-collision" in self.plugins.offers(POSE_TERMS):
             result += (self.plugins.make(POSE_TERMS, "self-collision"),)
         return result
+
+    def _reaches_beyond(self, kept: DistanceField, closed: Pose) -> bool:
+        """Whether skin lies where a field does not reach, but the object may: a body's, beyond its hand."""
+        if kept.spacing == self.field.spacing:
+            return False
+        skin = transform_points(self.object_from_rig, posed_points(self.rig, closed))
+        high = kept.origin + kept.spacing * (np.array(kept.values.shape) - 1)
+        return bool((skin < kept.origin).any() or (skin > high).any())
 
     def settings(self, kept: DistanceField, closed: Pose) -> SolveSettings:
         """How grasps are solved: from the closed hand and near it, digits and root free, a body's other joints as
@@ -137,7 +168,9 @@ class GraspScene:
         rig = self.rig
         moving = [rig.joints[j] for j in {*np.flatnonzero(rig.parents < 0).tolist(), *self.hand.joints.tolist()}]
         prior = self.prior if self.prior == "current" else {self.hand_name: self._drawn_to(closed)}
-        objective = Objective(self.terms(kept), free={self.hand_name: moving}, prior=prior, length=self.hand.length)
+        objective = Objective(
+            self.terms(kept, closed), free={self.hand_name: moving}, prior=prior, length=self.hand.length
+        )
         return SolveSettings(objective=objective, options=SolveOptions(candidates=AGAIN, max_iterations=60))
 
     def _drawn_to(self, closed: Pose) -> Pose:

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.inside import depth_inside
 from contact_core.geometry.mesh import TriangleMesh
@@ -21,7 +21,7 @@ from contact_core.geometry.transform import transform_points
 from contact_core.rig.skinning import joint_track, vertex_track
 from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
-from contact_core.solve.body import uniform_scale
+from contact_core.solve.body import Body, uniform_scale
 from contact_core.solve.state import PoseState
 from contact_core.solve.terms import BoundTerm
 
@@ -67,12 +67,16 @@ class PenetrationTerm(HasSettings):
         for index, body in enumerate(problem.bodies):
             wanted = len(body.rig.joints) > 1 if self.skins is None else body.name in self.skins
             if wanted and (len(problem.free_of_body[index]) or any(s.movable for s in solids.values())):
-                vertices, areas = thinned(body.rig.surface, self.samples)
+                vertices, areas = self.samples_of(body)
                 areas = areas * (uniform_scale(body.world_from_rig) / problem.unit) ** 2  # in l^2
                 track = vertex_track(body.rig, vertices, int(problem.bone_offsets[index]))
                 weights = self.weight / REFERENCE_AREA * areas
                 skins.append(_Skin(body.name, track, weights, np.zeros(len(vertices))))
         return _Depths(problem.unit, skins, solids)
+
+    def samples_of(self, body: Body) -> tuple[IntArray, FloatArray]:
+        """The vertices (k,) that stand for the skin of a body, and the area (k,) that each stands for."""
+        return thinned(body.rig.surface, self.samples)
 
     def solids_in(self, problem: PoseProblem) -> dict[str, Solid]:
         """What is solid, by body."""
@@ -291,13 +295,18 @@ def thinned(mesh: TriangleMesh, count: int) -> tuple[IntArray, FloatArray]:
 _thinned: WeakKeyDictionary[TriangleMesh, dict[int, tuple[IntArray, FloatArray]]] = WeakKeyDictionary()
 
 
-def _thin(mesh: TriangleMesh, count: int) -> tuple[IntArray, FloatArray]:
+def thinned_among(mesh: TriangleMesh, chosen: IntArray, count: int) -> tuple[IntArray, FloatArray]:
+    """`thinned` for a part of a surface: chosen (k,) are its vertices."""
+    return _thin(mesh, count, np.isin(np.arange(len(mesh.points)), chosen))
+
+
+def _thin(mesh: TriangleMesh, count: int, chosen: BoolArray | None = None) -> tuple[IntArray, FloatArray]:
     areas: FloatArray = np.zeros(len(mesh.points))
     np.add.at(areas, mesh.faces, mesh.face_areas[:, None] / 3.0)
-    used: IntArray = np.flatnonzero(areas > 0.0)
+    used: IntArray = np.flatnonzero((areas > 0.0) if chosen is None else (areas > 0.0) & chosen)
     if len(used) <= count:
         return used, areas[used]
-    cell = np.sqrt(float(mesh.face_areas.sum()) / count)
+    cell = np.sqrt(float(areas[used].sum()) / count)
     while True:
         keys = np.floor((mesh.points[used] - mesh.points[used].min(axis=0)) / cell).astype(np.int64)
         _, group = np.unique(keys, axis=0, return_inverse=True)

@@ -28,6 +28,7 @@ from contact_core.grasping.hand import Hand, spread_out
 from contact_core.grasping.slots import Approaches, GraspRequest, Kind, lacks
 from contact_core.settings import HasSettings, setting
 
+LARGE, MOST_PLACES = 12.0, 4.0  # square hand lengths of an object that has more places, up to so many times as many
 SPAN = 0.62  # hand lengths: what is thicker is not spanned
 ROOM = 0.35  # hand lengths: a palm needs so much room outwards
 BAR = 0.30  # hand lengths: what is thinner, and no wider, is closed on as a bar
@@ -38,7 +39,9 @@ ROLLS = 8
 SHARES = {"power": 3.0}  # of the approaches, where that of another kind is 1
 WIDEST = {"precision": 0.55, "pinch": 0.25, "lateral": 0.14}  # hand lengths
 PALM_POINTS = 40
-OPPOSITE = 24  # places between whose sides pads are laid
+MOVED = 0.3  # hand lengths that an approach may move a body out of an object
+OPPOSITE = 24  # places between whose sides pads are laid,
+IN_BODY = 4  # times as many for a hand whose body is in the way of most
 FITTING = 3  # ways of opposing that are tried at a place
 RELAXED = 0.3  # of its room: how far a digit that takes no part is bent
 
@@ -54,7 +57,7 @@ class Around(HasSettings):
 
     def sample(self, request: GraspRequest) -> Approaches:
         hand, length = request.hand, request.hand.length
-        found = features_of(request.mesh, length, self.places, request.seed, request.at)
+        found = features_of(request.mesh, length, self._count(request), request.seed, request.at)
         makers = {"power": _power, "hook": _hook, "precision": _tips, "pinch": _tips, "lateral": _tips}
         wanted = [kind for kind in request.kinds if lacks(hand, kind) is None]
         parts = []
@@ -62,7 +65,7 @@ class Around(HasSettings):
             made = list(makers[kind](hand, found, kind))
             if made:
                 joined = Approaches.joined(made)
-                free = joined[_palm_is_free(request, joined)]
+                free = joined[_free(request, joined)]
                 share = SHARES.get(kind, 1.0) / sum(SHARES.get(each, 1.0) for each in wanted)
                 parts.append(_thinned(free, int(share * self.most), request.seed))
         if (handled := through_handle(request, tuple(wanted))) is not None:
@@ -71,15 +74,29 @@ class Around(HasSettings):
             parts.append(threaded)
         return Approaches.joined(parts) if parts else _none(hand)
 
+    def _count(self, request: GraspRequest) -> int:
+        """How many places: more of a large object, on which those that a hand can span are few."""
+        area = float(request.mesh.face_areas.sum()) / request.hand.length**2
+        return int(self.places * np.clip(area / LARGE, 1.0, MOST_PLACES))
 
-def _palm_is_free(request: GraspRequest, approaches: Approaches) -> IntArray:
-    """Which of those that stay where they are have the palm outside the object; those that move all count."""
+
+def _free(request: GraspRequest, approaches: Approaches) -> IntArray:
+    """Which approaches have the palm outside of the object, of those that stay where they are; and of a hand in a
+    body, the body, which else is in the way of nearly all where an object is large."""
     hand = request.hand
     stays = ~approaches.ways.any(axis=1)
     some = hand.tested[spread_out(hand.tested, PALM_POINTS, 0)]
-    points = np.einsum("nij,pj->npi", approaches.placed[:, :3, :3], some) + approaches.placed[:, None, :3, 3]
-    clear = request.field.distances(points.reshape(-1, 3)).reshape(len(points), -1).min(axis=1)
-    return np.flatnonzero(~stays | (clear > -0.005 * hand.length))
+    free = ~stays | (_least_distances(request, approaches, some) > -0.005 * hand.length)
+    if hand.is_in_body:
+        moved = np.where(stays, 0.0, MOVED)  # may still come free
+        free &= _least_distances(request, approaches, hand.rest) > -moved * hand.length
+    return np.flatnonzero(free)
+
+
+def _least_distances(request: GraspRequest, approaches: Approaches, points: FloatArray) -> FloatArray:
+    """(N,) the least signed distance of points (k, 3) of the hand to the object."""
+    placed = np.einsum("nij,pj->npi", approaches.placed[:, :3, :3], points) + approaches.placed[:, None, :3, 3]
+    return request.field.distances(placed.reshape(-1, 3)).reshape(len(placed), -1).min(axis=1)
 
 
 def _thinned(approaches: Approaches, most: int, seed: int) -> Approaches:
@@ -185,7 +202,8 @@ def _tips(hand: Hand, found: Features, kind: Kind) -> Iterator[Approaches]:
         return
     widest = min(max(one.width for one in table), WIDEST[kind] * hand.length)
     rows = np.flatnonzero(facing & (found.thickness < 0.95 * widest))
-    for row in rows[spread_out(found.points[rows], OPPOSITE, 0)] if len(rows) else rows:
+    count = IN_BODY * OPPOSITE if hand.is_in_body else OPPOSITE
+    for row in rows[spread_out(found.points[rows], count, 0)] if len(rows) else rows:
         place = found[np.array([row])]
         for one in _fitting(table, float(place.thickness[0])):
             yield _pinched(hand, place, one, kind)
