@@ -5,7 +5,7 @@ computed again. What a brush leaves is made once, at release; until then a front
 
 They are exact where that is cheap. On a dense mesh, whose windows would be as many as the cube of the faces across
 the brush, they spread as fronts (`geometry.fronts`), off by a twentieth of a percent of the radius on average (ADR
-0106).
+0117).
 """
 
 from __future__ import annotations
