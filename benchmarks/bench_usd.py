@@ -2,7 +2,7 @@
 
     python -m benchmarks.bench_usd [--quick]
 
-Medians of several runs, wall time. Connectivity is built when first asked for and is not part of reading.
+Medians of several runs, processor time; first times by the clock. Connectivity is built when first asked for and is not part of reading.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SIDE = 708  # points along one side: about a million triangles
 
 
 def seconds(work: Callable[[], object], repeats: int) -> float:
-    """Median wall time of a call."""
+    """Median processor time of a call."""
     return interleaved({"it": work}, repeats)["it"].median
 
 
