@@ -2,7 +2,8 @@
 
     python -m benchmarks.bench_usd [--quick]
 
-Medians of several runs, processor time; first times by the clock. Connectivity is built when first asked for and is not part of reading.
+Medians of several runs, processor time; first times by the clock. Connectivity is built when first asked for and
+is not part of reading.
 """
 
 from __future__ import annotations
