@@ -26,7 +26,13 @@ _FILLED: WeakKeyDictionary[DistanceField, dict[float, DistanceField]] = WeakKeyD
 
 
 def filled(open_field: DistanceField, radius: float) -> DistanceField:
-    """The signed distance to what a ball of `radius` outside does not reach, negative inside; field units."""
+    """The signed distance to what a ball of `radius` outside does not reach, negative inside; field units.
+
+    A ball wider than the field's longest side counts as one of that radius. Distances outside the field are upper
+    bounds, so that a wider one would be told to reach where it cannot; and memory would grow with the cube of hand
+    over object (a hand in centimetres that is read as metres).
+    """
+    radius = min(radius, open_field.spacing * (max(open_field.values.shape) - 1))
     margin = int(np.ceil(radius / open_field.spacing)) + 1
     values = np.pad(open_field.values, margin, mode="edge")
     outer = np.pad(np.ones(np.array(values.shape) - 2 * margin), margin)
