@@ -161,6 +161,49 @@ def bent_finger(rig: Rig) -> np.ndarray:
     return local
 
 
+@pytest.mark.parametrize("scale", [[1, 1, 1], [-1, 1, 1], [0.01, 0.01, 0.01]])
+@pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
+def test_a_damaged_bind_matrix_of_a_joint_that_moves_nothing_costs_nothing(
+    tmp_path: Path, value: float, scale: list[float]
+) -> None:
+    document, binary = parts_of(CASES / "g18_req_VRM.glb")
+    joints = document["skins"][0]["joints"]
+    document["nodes"].append({"name": "tip", "translation": [0, 0.2, 0]})
+    document["nodes"][joints[-1]].setdefault("children", []).append(len(document["nodes"]) - 1)
+    document["nodes"].append({"name": "above", "scale": scale, "children": document["scenes"][0]["nodes"]})
+    document["scenes"][0]["nodes"] = [len(document["nodes"]) - 1]
+    accessor = document["accessors"][document["skins"][0]["inverseBindMatrices"]]
+    start = document["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    known = binary[start : start + 64 * len(joints)]
+    plain = rig_of(save(tmp_path / "plain.glb", document, binary))
+
+    document["skins"][0]["joints"] = [*joints, len(document["nodes"]) - 2]
+    binary += b"\0" * (-len(binary) % 4)
+    view = {"buffer": 0, "byteOffset": len(binary), "byteLength": 64 * (len(joints) + 1)}
+    document["bufferViews"].append(view)
+    document["accessors"].append(
+        accessor | {"bufferView": len(document["bufferViews"]) - 1, "count": len(joints) + 1, "byteOffset": 0}
+    )
+    document["skins"][0]["inverseBindMatrices"] = len(document["accessors"]) - 1
+    damaged = np.full(16, value, "<f4").tobytes()
+    asset = read(save(tmp_path / "damaged.glb", document, binary + known + damaged))
+    assert asset.rig is not None and asset.rig.joints == (*plain.joints, "tip")
+    assert sum("Damaged bind matrices" in note and "tip" in note for note in asset.notes) == 1
+    assert np.allclose(asset.mesh.points, plain.surface.points) and volume(asset.mesh) > 0
+    carried = np.linalg.solve(asset.rig.bind_world[-2], asset.rig.bind_world[-1])
+    assert np.allclose(carried, np.linalg.solve(asset.rig.rest_world[-2], asset.rig.rest_world[-1]), atol=1e-6)
+
+
+def test_a_damaged_bind_matrix_of_a_joint_that_moves_skin_is_refused(tmp_path: Path) -> None:
+    document, binary = parts_of(CASES / "g18_req_VRM.glb")
+    accessor = document["accessors"][document["skins"][0]["inverseBindMatrices"]]
+    start = document["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    for joint in range(len(document["skins"][0]["joints"])):
+        spoilt = binary[: start + 64 * joint] + b"\0" * 64 + binary[start + 64 * (joint + 1) :]
+        with pytest.raises(FileRefused, match="bind matrix is singular"):
+            read(save(tmp_path / "spoilt.glb", document, spoilt))
+
+
 @pytest.mark.parametrize("name", ["KHR_materials_unlit", "VRMC_vrm", "KHR_xmp_json_ld", "EXT_mesh_features"])
 def test_required_extensions_that_change_no_shape_are_read(tmp_path: Path, name: str) -> None:
     assert read(changed(tmp_path, "g18_req_VRM.glb", extensionsRequired=[name])).rig is not None

@@ -10,7 +10,7 @@ import numpy as np
 
 from contact_builtins.formats.gltf_container import open_gltf
 from contact_builtins.formats.gltf_nodes import read_nodes
-from contact_builtins.formats.gltf_rig import rig_asset
+from contact_builtins.formats.gltf_rig import followed_by, rig_asset
 from contact_builtins.formats.gltf_scene import Part, read_parts
 from contact_builtins.formats.gltf_skeleton import read_skeleton
 from contact_builtins.formats.polygons import Polygons, surface_of
@@ -71,7 +71,7 @@ class GltfFiles:
             words = read_sidecar(told) if told else None
             rig = rig_asset(gltf, nodes, parts, words, notes).rig
             assert rig is not None
-            return read_clips(gltf, nodes, (read_skeleton(gltf, nodes, skins, words), rig), objects, rate)
+            return read_clips(gltf, nodes, (read_skeleton(gltf, nodes, followed_by(parts), words), rig), objects, rate)
 
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
         """One GLB with every asset; rigs as skins in their pose. Raises FileRefused, InvalidInput."""

@@ -26,7 +26,7 @@ LEAST = 1e-6  # weight below which a joint counts for nothing
 
 def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | None, notes: list[str]) -> Asset:
     """The asset of a file with skins. Raises FileRefused, InvalidInput."""
-    skeleton = read_skeleton(gltf, nodes, sorted({p.skin for p in parts if p.skin is not None}), sidecar)
+    skeleton = read_skeleton(gltf, nodes, followed_by(parts), sidecar)
     bounded(
         sum(len(part.points) for part in parts) * len(skeleton.names) // 16, "weights"
     )  # (n, j) is held at once
@@ -78,6 +78,18 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
             "hands": [asdict(words) for words in sidecar.hands] if sidecar else [],
         },
     )
+
+
+def followed_by(parts: list[Part]) -> dict[int, IntArray]:
+    """Per skin that is shown, the entries of its list of joints that some vertex follows, in or out of that list."""
+    found: dict[int, list[IntArray]] = {}
+    for part in parts:
+        if part.skin is not None:
+            told = found.setdefault(part.skin, [])
+            if part.joints is not None and part.weights is not None:
+                told.append(part.joints[part.weights > LEAST])
+                told.append(part.joints[~(part.weights > LEAST).any(axis=1), 0])  # no weight: the first is followed
+    return {skin: np.unique(np.concatenate([np.zeros(0, np.int64), *told])) for skin, told in found.items()}
 
 
 def _joined(

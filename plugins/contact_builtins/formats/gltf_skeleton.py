@@ -8,6 +8,7 @@ come twice: linear blending has one bind matrix per joint, so the second is a jo
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 
 from contact_builtins.formats.gltf_container import Gltf
 from contact_builtins.formats.gltf_nodes import Nodes
-from contact_builtins.formats.refusal import MAX_JOINTS, bounded
+from contact_builtins.formats.refusal import MAX_JOINTS, bounded, named
 from contact_builtins.formats.sidecar import Sidecar
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import FileRefused, InvalidInput
@@ -47,15 +48,21 @@ class Skeleton:
     notes: tuple[str, ...]
 
 
-def read_skeleton(gltf: Gltf, nodes: Nodes, skins: list[int], sidecar: Sidecar | None) -> Skeleton:
-    """The joints that skins name. Raises FileRefused, InvalidInput."""
-    slots, binds, entries, corrections = _slots(gltf, skins)
+def read_skeleton(gltf: Gltf, nodes: Nodes, followed: Mapping[int, IntArray], sidecar: Sidecar | None) -> Skeleton:
+    """The joints that skins name. followed: per skin, the entries of its list that move a vertex.
+
+    Raises FileRefused, InvalidInput.
+    """
+    slots, binds, entries, corrections, odd = _slots(gltf, nodes, followed)
     bounded(len(slots), "joints", MAX_JOINTS)
     position = {node: k for k, node in enumerate(nodes.order)}
     first = {node: k for k, node in reversed(list(enumerate(slots)))}  # the slot in which a node is bound first
     order = sorted(first, key=lambda node: position[node])
     names = _unique_names(nodes, order)
     parents, notes = _parents(gltf.path, nodes, order, names, sidecar)
+    if odd:
+        told = named([nodes.names[node] for node in odd])
+        notes.append(f"Damaged bind matrices of joints that move nothing were replaced, as these joints rest: {told}.")
     sequence = _sorted_parents_first(parents)
     rank = {old: new for new, old in enumerate(sequence)}
     parents = np.array([rank[int(parents[k])] if parents[k] >= 0 else -1 for k in sequence])
@@ -91,20 +98,23 @@ def read_skeleton(gltf: Gltf, nodes: Nodes, skins: list[int], sidecar: Sidecar |
 
 
 def _slots(
-    gltf: Gltf, skins: list[int]
-) -> tuple[list[int], list[FloatArray], dict[int, list[int]], dict[int, FloatArray]]:
-    """Distinct pairs of joint and bind matrix: the nodes, the matrices, the pair of each skin's entries, and the
-    (4, 4) per skin that takes its bind space to the common one."""
+    gltf: Gltf, nodes: Nodes, followed: Mapping[int, IntArray]
+) -> tuple[list[int], list[FloatArray], dict[int, list[int]], dict[int, FloatArray], list[int]]:
+    """Distinct pairs of joint and bind matrix: the nodes, the matrices, the pair of each skin's entries, the (4, 4)
+    per skin that takes its bind space to the common one, and the nodes whose bind matrices were replaced."""
     slots, binds = list[int](), list[FloatArray]()
     of_node: dict[int, list[int]] = defaultdict(list)
     entries: dict[int, list[int]] = {}
     corrections: dict[int, FloatArray] = {}
-    for skin in skins:
+    replaced: dict[int, None] = {}
+    for skin in sorted(followed):
         entry = gltf.entry("skins", skin)
         joints = [int(joint) for joint in entry["joints"]]
         for joint in joints:
             gltf.entry("nodes", joint)
-        own = _bind_matrices(gltf, entry, joints)
+        own, damaged = _bind_matrices(gltf, entry, joints, followed[skin])
+        _bind_as_carried(own, damaged, joints, nodes)
+        replaced |= dict.fromkeys(joints[k] for k in damaged)
         bridge = corrections[skin] = _bridge(
             [(binds[of_node[j][0]], own[k]) for k, j in enumerate(joints) if j in of_node]
         )
@@ -116,7 +126,7 @@ def _slots(
                 binds.append(matrix)
                 of_node[joint].append(slot)
             entries[skin].append(slot)
-    return slots, binds, entries, corrections
+    return slots, binds, entries, corrections, list(replaced)
 
 
 def _bridge(common: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
@@ -129,17 +139,39 @@ def _bridge(common: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
     return max(tried, key=lambda bridge: sum(_same(bind, bridge @ own) for bind, own in common))
 
 
-def _bind_matrices(gltf: Gltf, entry: dict[str, Any], joints: list[int]) -> FloatArray:
-    """(k, 4, 4) world_from_joint at which a skin was bound."""
+def _bind_matrices(
+    gltf: Gltf, entry: dict[str, Any], joints: list[int], followed: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """(k, 4, 4) world_from_joint at which a skin was bound, and which of them cannot be told, identity here.
+
+    Raises InvalidInput where one that moves a vertex cannot be told: no other number says how the vertex moves.
+    """
     if "inverseBindMatrices" not in entry:
-        return np.tile(np.eye(4), (len(joints), 1, 1))
+        return np.tile(np.eye(4), (len(joints), 1, 1)), np.zeros(0, np.int64)
     inverse = gltf.accessor(entry["inverseBindMatrices"]).astype(np.float64)
     if inverse.shape[1] != 16 or len(inverse) < len(joints):
         raise InvalidInput(f"a skin has {len(joints)} joints, but {len(inverse)} inverse bind matrices")
     inverse = inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
-    if not np.isfinite(inverse).all() or (np.abs(np.linalg.det(inverse)) < 1e-30).any():
+    odd = ~np.isfinite(inverse).all(axis=(1, 2))
+    inverse[odd] = 0.0
+    odd |= np.abs(np.linalg.det(inverse)) < 1e-30
+    if odd.all() or odd[followed[(followed >= 0) & (followed < len(joints))]].any():
         raise InvalidInput("an inverse bind matrix is singular or not finite")
-    return np.asarray(np.linalg.inv(inverse), np.float64)
+    inverse[odd] = np.eye(4)
+    return np.asarray(np.linalg.inv(inverse), np.float64), np.flatnonzero(odd)
+
+
+def _bind_as_carried(bind: FloatArray, damaged: IntArray, joints: list[int], nodes: Nodes) -> None:
+    """Fill in where damaged joints were bound: as they rest to the nearest sound joint above, else to any."""
+    sound = {joint: k for k, joint in enumerate(joints) if k not in set(damaged.tolist())}
+    for k in damaged:
+        above = joints[k]
+        while above >= 0 and above not in sound:
+            above = int(nodes.parents[above])
+        carrier = above if above >= 0 else next(iter(sound))
+        rest = nodes.world[carrier]
+        if np.abs(np.linalg.det(rest)) > 1e-30:
+            bind[k] = bind[sound[carrier]] @ np.linalg.solve(rest, nodes.world[joints[k]])
 
 
 def _normalised(rest: FloatArray, bind: FloatArray) -> tuple[FloatArray, FloatArray, str]:
