@@ -50,10 +50,13 @@ class UsdFiles:
                 rig = host.read_rig(rigs[0])
                 beside = [item.id for item in items if item.kind != "rig"]
                 told = [f"meshes beside the rig, which are not part of it: {named(beside)}."] if beside else []
-                return replace(rig, notes=(*rig.notes, *told, *host.losses()))
+                return replace(rig, notes=(*host.space().notes, *rig.notes, *told, *host.losses()))
             if rigs or not items:
+                from contact_usd.primitives import unchosen_variants
+
                 found = f"{len(rigs)} rigs ({', '.join(rigs[:6])})" if rigs else "no meshes"
-                found += "".join(f" ({note.rstrip('.')})" for note in host.losses()[:2])
+                told = [*host.space().notes, *host.losses(), *unchosen_variants(host.stage)]
+                found += "".join(f" ({note.rstrip('.')})" for note in told[:3])
                 raise FileRefused(
                     f"{path} has {found}; as a file it is read where it has one rig, or meshes alone."
                 )

@@ -105,7 +105,7 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
     # Scene reading and writing
 
     def objects(self) -> tuple[SceneObject, ...]:
-        skinned = {str(q.GetPrim().GetPath()) for _, b in self._rigs().values() for q in skel.skinned_meshes(b)}
+        skinned = {str(q.GetPrim().GetPath()) for _, b in self._rigs().values() for q in skel.influenced_meshes(b)}
         found = []
         for prim in _drawn_prims(self.stage):
             path = str(prim.GetPath())
@@ -117,10 +117,9 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
 
     def losses(self) -> list[str]:
         """Notes on shapes of the stage that are no objects here, or not all that they could be."""
-        rigs = self._rigs().values()
-        return silent_losses(
-            self.stage, {str(q.GetPrim().GetPath()) for _, b in rigs for q in skel.skinned_meshes(b)}
-        )
+        rigs = [binding for _, binding in self._rigs().values()]
+        influenced = {str(q.GetPrim().GetPath()) for b in rigs for q in skel.influenced_meshes(b)}
+        return [*(note for b in rigs for note in skel.losses(b)), *silent_losses(self.stage, influenced)]
 
     def read_surface(self, object_id: str) -> Asset:
         if object_id in self._rigs():

@@ -44,14 +44,23 @@ def solid_of(prim: Usd.Prim) -> solids.Solid:
     return _along(prim, maker)
 
 
+def is_hidden(prim: Usd.Prim) -> bool:
+    """Whether a prim, or something above it, is made invisible."""
+    return bool(UsdGeom.Imageable(prim).ComputeVisibility(AS_IT_STANDS) == UsdGeom.Tokens.invisible)
+
+
+def stands_in(prim: Usd.Prim) -> bool:
+    """Whether a prim is a guide or a proxy by its purpose, which a renderer does not draw."""
+    return UsdGeom.Imageable(prim).ComputePurpose() in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+
+
 def drawn(prims: dict[str, Usd.Prim]) -> tuple[list[str], list[str]]:
     """The paths that a renderer draws by default, and notes on the others: guides, proxies, what is invisible."""
     left: dict[str, list[str]] = {"guides": [], "proxies": [], "invisible": []}
     kept = []
     for path, prim in prims.items():
-        shape = UsdGeom.Imageable(prim)
-        purpose = shape.ComputePurpose()
-        if shape.ComputeVisibility(AS_IT_STANDS) == UsdGeom.Tokens.invisible:
+        purpose = UsdGeom.Imageable(prim).ComputePurpose()
+        if is_hidden(prim):
             left["invisible"].append(path)
         elif purpose == UsdGeom.Tokens.guide:
             left["guides"].append(path)
@@ -66,12 +75,18 @@ def drawn(prims: dict[str, Usd.Prim]) -> tuple[list[str], list[str]]:
 
 
 def silent_losses(stage: Usd.Stage, skinned: set[str]) -> list[str]:
-    """Notes on what a stage holds and this reading does not take: point instances, skins without a SkelRoot."""
+    """Notes on what a stage draws and this reading does not take: point instances, skins without a SkelRoot, and
+    what is no mesh (curves, patches, points)."""
     notes = []
+    others: dict[str, list[str]] = {}
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if prim.IsA(UsdGeom.PointInstancer):
             count = len(UsdGeom.PointInstancer(prim).GetProtoIndicesAttr().Get(AS_IT_STANDS) or ())
             notes.append(f"{prim.GetPath()} scatters {count} copies (PointInstancer), which are not read.")
+            continue
+        if prim.IsA(UsdGeom.Gprim) and not prim.IsA(UsdGeom.Mesh) and not is_primitive(prim):
+            if not stands_in(prim) and not is_hidden(prim):
+                others.setdefault(str(prim.GetTypeName()), []).append(str(prim.GetPath()))
             continue
         influenced = prim.IsA(UsdGeom.Mesh) and prim.HasAttribute("primvars:skel:jointIndices")
         if influenced and str(prim.GetPath()) not in skinned:
@@ -79,6 +94,21 @@ def silent_losses(stage: Usd.Stage, skinned: set[str]) -> list[str]:
                 f"{prim.GetPath()} has joint influences, but USD does not skin it (no SkelRoot above it, or no"
                 " skeleton bound): it was read as a rigid mesh."
             )
+    for kind, paths in others.items():
+        more = f" and {len(paths) - 8} more" if len(paths) > 8 else ""
+        notes.append(f"drawn, but not read, for a {kind} is no mesh: {', '.join(paths[:8])}{more}.")
+    return notes
+
+
+def unchosen_variants(stage: Usd.Stage) -> list[str]:
+    """Notes on variant sets of which no variant is chosen: what they hold is not there."""
+    notes = []
+    for prim in stage.Traverse():
+        for name in prim.GetVariantSets().GetNames():
+            there = prim.GetVariantSet(name)
+            if there.GetVariantNames() and not there.GetVariantSelection():
+                listed = ", ".join(there.GetVariantNames()[:6])
+                notes.append(f"{prim.GetPath()} has no choice in its variant set {name} ({listed}).")
     return notes
 
 

@@ -23,6 +23,7 @@ from contact_core.scene.host import SceneSpace
 from contact_core.scene.reading import stretch_rig
 from contact_usd.freedoms import read_freedoms
 from contact_usd.mesh import AS_IT_STANDS, matrix_of, placement_of, read_arrays
+from contact_usd.primitives import is_hidden, stands_in
 
 INSTANCES = Usd.TraverseInstanceProxies()
 _FLAT = 1e-9  # volume of a unit cube in a joint's axes, made unit: below it the axes are as good as in one plane
@@ -60,11 +61,32 @@ def bindings(stage: Usd.Stage) -> dict[str, tuple[UsdSkel.Cache, UsdSkel.Binding
     return found
 
 
-def skinned_meshes(binding: UsdSkel.Binding) -> Iterator[UsdSkel.SkinningQuery]:
+def influenced_meshes(binding: UsdSkel.Binding) -> Iterator[UsdSkel.SkinningQuery]:
     """The meshes that a skeleton moves by joint influences."""
     for query in binding.GetSkinningTargets():
         if query.GetPrim().IsA(UsdGeom.Mesh) and query.HasJointInfluences():
             yield query
+
+
+def skinned_meshes(binding: UsdSkel.Binding) -> list[UsdSkel.SkinningQuery]:
+    """Those that are the skin: guides and proxies only where there is nothing else.
+
+    Purposes alone decide: what an artist hides for a while stays part of the skin that patches lie on.
+    """
+    every = list(influenced_meshes(binding))
+    return [query for query in every if not stands_in(query.GetPrim())] or every
+
+
+def losses(binding: UsdSkel.Binding) -> list[str]:
+    """Notes on meshes of a rig that are left out of its skin, or that are in it and cannot be seen."""
+    skin = {str(query.GetPrim().GetPath()): query.GetPrim() for query in skinned_meshes(binding)}
+    every = [str(query.GetPrim().GetPath()) for query in influenced_meshes(binding)]
+    unseen = [path for path, prim in skin.items() if is_hidden(prim)]
+    told = {
+        "guides and proxies of the rig, left out of its skin": [path for path in every if path not in skin],
+        "invisible, and part of the rig all the same": unseen if len(unseen) < len(skin) else [],
+    }
+    return [f"{what}: {', '.join(paths[:8])}." for what, paths in told.items() if paths]
 
 
 def joint_names(skeleton: UsdSkel.Skeleton) -> tuple[str, ...]:

@@ -71,7 +71,9 @@ class GltfFiles:
             words = read_sidecar(told) if told else None
             rig = rig_asset(gltf, nodes, parts, words, notes).rig
             assert rig is not None
-            return read_clips(gltf, nodes, (read_skeleton(gltf, nodes, followed_by(parts), words), rig), objects, rate)
+            return read_clips(
+                gltf, nodes, (read_skeleton(gltf, nodes, followed_by(parts), words), rig), objects, rate
+            )
 
     def write(self, path: Path, assets: Sequence[Asset], poses: Mapping[str, Pose]) -> None:
         """One GLB with every asset; rigs as skins in their pose. Raises FileRefused, InvalidInput."""

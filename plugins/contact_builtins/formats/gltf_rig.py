@@ -81,7 +81,7 @@ def rig_asset(gltf: Gltf, nodes: Nodes, parts: list[Part], sidecar: Sidecar | No
 
 
 def followed_by(parts: list[Part]) -> dict[int, IntArray]:
-    """Per skin that is shown, the entries of its list of joints that some vertex follows, in or out of that list."""
+    """Per skin that is shown, the entries of its list of joints that some vertex follows, in that list or not."""
     found: dict[int, list[IntArray]] = {}
     for part in parts:
         if part.skin is not None:

@@ -62,7 +62,9 @@ def read_skeleton(gltf: Gltf, nodes: Nodes, followed: Mapping[int, IntArray], si
     parents, notes = _parents(gltf.path, nodes, order, names, sidecar)
     if odd:
         told = named([nodes.names[node] for node in odd])
-        notes.append(f"Damaged bind matrices of joints that move nothing were replaced, as these joints rest: {told}.")
+        notes.append(
+            f"Damaged bind matrices of joints that move nothing were replaced, as these joints rest: {told}."
+        )
     sequence = _sorted_parents_first(parents)
     rank = {old: new for new, old in enumerate(sequence)}
     parents = np.array([rank[int(parents[k])] if parents[k] >= 0 else -1 for k in sequence])

@@ -9,12 +9,14 @@ import pytest
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 
-from pxr import Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
+from contact_core.geometry.solids import box
 from contact_core.testing.host_checks import volume
 from contact_usd.files import UsdFiles
+from contact_usd.host import UsdHost
 
 CASES = Path(__file__).parents[2] / "data" / "cases"
 
@@ -42,6 +44,95 @@ def test_a_skin_without_a_skel_root_and_point_instances_are_named() -> None:
     assert any("no SkelRoot" in note for note in read(CASES / "d01_no_skelroot.usda").notes)
     with pytest.raises(FileRefused, match="/W/pi scatters 2 copies"):
         read(CASES / "d22_pointinstancer.usda")
+
+
+@pytest.mark.parametrize("kind", ["BasisCurves", "NurbsCurves", "Points", "NurbsPatch"])
+def test_what_is_drawn_and_is_no_mesh_is_named(tmp_path: Path, kind: str) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "s.usda"))
+    for name in ("hair", "guide", "off"):
+        stage.DefinePrim(f"/{name}", kind)
+    UsdGeom.Imageable(stage.GetPrimAtPath("/guide")).CreatePurposeAttr("guide")
+    UsdGeom.Imageable(stage.GetPrimAtPath("/off")).MakeInvisible()
+    UsdGeom.Cube.Define(stage, "/block")
+    stage.Save()
+    told = [note for note in read(tmp_path / "s.usda").notes if kind in note]
+    assert len(told) == 1 and "/hair" in told[0] and "/guide" not in told[0] and "/off" not in told[0]
+
+
+def rig_of_parts(path: Path, **purposes: str) -> Path:
+    """Cubes one beside the other, all on one joint; a word for each: its purpose, or "invisible"."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdSkel.Root.Define(stage, "/R")
+    skeleton = UsdSkel.Skeleton.Define(stage, "/R/S")
+    skeleton.CreateJointsAttr(["w"])
+    skeleton.CreateBindTransformsAttr([Gf.Matrix4d(1)])
+    skeleton.CreateRestTransformsAttr([Gf.Matrix4d(1)])
+    points, faces = box(1.0, 1.0, 1.0)
+    for place, (name, word) in enumerate(purposes.items()):
+        mesh = UsdGeom.Mesh.Define(stage, f"/R/{name}")
+        mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy((points + 3.0 * place * np.eye(3)[0]).astype(np.float32)))
+        mesh.CreateFaceVertexCountsAttr([3] * len(faces))
+        mesh.CreateSubdivisionSchemeAttr("none")
+        mesh.CreateFaceVertexIndicesAttr(faces.ravel().tolist())
+        binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+        binding.CreateJointIndicesPrimvar(False, 1).Set([0] * len(points))
+        binding.CreateJointWeightsPrimvar(False, 1).Set([1.0] * len(points))
+        binding.CreateSkeletonRel().SetTargets(["/R/S"])
+        if word == "invisible":
+            mesh.MakeInvisible()
+        else:
+            mesh.CreatePurposeAttr(word)
+    stage.Save()
+    return path
+
+
+@pytest.mark.parametrize("word", ["guide", "proxy"])
+def test_guides_and_proxies_of_a_rig_are_named_and_no_skin(tmp_path: Path, word: str) -> None:
+    asset = read(rig_of_parts(tmp_path / "s.usda", skin="render", other=word))
+    assert np.isclose(volume(asset.mesh), 1.0) and np.ptp(asset.mesh.points[:, 0]) == 1.0
+    assert sum("/R/other" in note for note in asset.notes) == 1
+    host = UsdHost(tmp_path / "s.usda")
+    assert [(item.id, item.kind) for item in host.objects()] == [("/R/S", "rig")]
+    assert host.selections("/R/S") == ()
+
+
+def test_a_rig_of_guides_alone_is_read(tmp_path: Path) -> None:
+    asset = read(rig_of_parts(tmp_path / "s.usda", skin="guide", other="guide"))
+    assert np.isclose(volume(asset.mesh), 2.0) and not asset.notes
+
+
+def test_what_is_hidden_stays_part_of_a_rig_and_is_named(tmp_path: Path) -> None:
+    asset = read(rig_of_parts(tmp_path / "s.usda", skin="default", shirt="invisible"))
+    assert np.isclose(volume(asset.mesh), 2.0)
+    assert sum("/R/shirt" in note for note in asset.notes) == 1
+    assert not read(rig_of_parts(tmp_path / "all.usda", skin="invisible")).notes  # hidden as a whole
+
+
+@pytest.mark.parametrize("kind", ["references", "payload"])
+def test_what_is_missing_is_told_with_a_rig_and_where_nothing_is_left(tmp_path: Path, kind: str) -> None:
+    gap = f'def Xform "gap" (prepend {kind} = @./gone.usda@) {{}}\n'
+    (tmp_path / "s.usda").write_text(f"#usda 1.0\n{gap}")
+    with pytest.raises(FileRefused, match=r"no meshes .*gone\.usda"):
+        read(tmp_path / "s.usda")
+    path = rig_of_parts(tmp_path / "rig.usda", skin="render")
+    path.write_text(path.read_text() + gap)
+    assert any("gone.usda" in note for note in read(path).notes)
+
+
+def test_a_variant_that_nobody_chose_is_told(tmp_path: Path) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "s.usda"))
+    model = UsdGeom.Xform.Define(stage, "/r").GetPrim().GetVariantSets().AddVariantSet("model")
+    for name, kind in (("lo", "Sphere"), ("hi", "Cube")):
+        model.AddVariant(name)
+        model.SetVariantSelection(name)
+        with model.GetVariantEditContext():
+            stage.DefinePrim("/r/solid", kind)
+    stage.Save()
+    assert np.isclose(volume(read(tmp_path / "s.usda").mesh), 8.0)
+    model.ClearVariantSelection()
+    stage.Save()
+    with pytest.raises(FileRefused, match=r"/r has no choice in its variant set model \((hi, lo|lo, hi)\)"):
+        read(tmp_path / "s.usda")
 
 
 def test_the_fallback_sizes_of_primitives() -> None:
