@@ -47,6 +47,23 @@ def test_png_round_trip() -> None:
     np.testing.assert_array_equal(decoded(encode_png(image)), image)
 
 
+@pytest.mark.parametrize("turn", [20.0, 40.0, 60.0, 75.0])
+def test_what_stands_behind_a_large_triangle_is_hidden(turn: float) -> None:
+    """One triangle, seen aslant, runs from near the eye to far away: a ball behind it never shows, before it always."""
+    angle = np.radians(turn)
+    along, out = np.array([np.cos(angle), 0.0, np.sin(angle)]), np.array([-np.sin(angle), 0.0, np.cos(angle)])
+    ball = icosphere()
+    ball = TriangleMesh(0.1 * ball.points / np.abs(ball.points).max(), ball.faces)
+    corners = np.stack([1.2 * along, -9 * along + [0, 9, 0], -9 * along - [0, 9, 0]])
+    wall = TriangleMesh(corners, np.array([[0, 1, 2]]))
+    for side, shows in ((-0.2, False), (0.2, True)):
+        placed = TriangleMesh(ball.points + side * out, ball.faces)
+        focus = np.array([[-1.0, -1, 0], [1, 1, 0]])
+        picture = Picture((PictureMesh(wall, BLUE), PictureMesh(placed, RED)), camera_from=(0, 0, 1), focus=focus)
+        image = draw(picture, SIZE).astype(int)
+        assert (image[..., 0] > image[..., 2] + 60).any() == shows
+
+
 def covered(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
     """Pixels whose colour is strong; the background is nearly grey."""
     return np.ptp(image.astype(int), axis=2) > 60

@@ -132,8 +132,10 @@ class _Canvas:
             covered &= ((pixels * (7, 13)).sum(axis=-1) % 16) < 16 * opacity
         which, where = np.nonzero(covered)
         weight = weights[which, where]  # (f, 3)
-        depth = (weight * corners[which, :, 2]).sum(axis=1)
-        self.fragments(pixels[which, where], depth, np.einsum("fc,fci->fi", weight, colors[which]))
+        weight = weight / corners[which, :, 2]  # in perspective 1 / depth is linear across the picture, depth is not
+        depth = 1.0 / weight.sum(axis=1)
+        seen = np.einsum("fc,fci->fi", weight * depth[:, None], colors[which])
+        self.fragments(pixels[which, where], depth, seen)
 
     def discs(self, points: FloatArray, color: FloatArray, radius: int) -> None:
         """Round dots, pulled a little towards the eye so that they show on the surface that carries them."""
