@@ -49,7 +49,7 @@ def test_png_round_trip() -> None:
 
 @pytest.mark.parametrize("turn", [20.0, 40.0, 60.0, 75.0])
 def test_what_stands_behind_a_large_triangle_is_hidden(turn: float) -> None:
-    """One triangle, seen aslant, runs from near the eye to far away: a ball behind it never shows, before it always."""
+    """A triangle, seen aslant, runs from near the eye to far away: it hides a ball behind it, not one before it."""
     angle = np.radians(turn)
     along, out = np.array([np.cos(angle), 0.0, np.sin(angle)]), np.array([-np.sin(angle), 0.0, np.cos(angle)])
     ball = icosphere()

@@ -132,7 +132,7 @@ class _Canvas:
             covered &= ((pixels * (7, 13)).sum(axis=-1) % 16) < 16 * opacity
         which, where = np.nonzero(covered)
         weight = weights[which, where]  # (f, 3)
-        weight = weight / corners[which, :, 2]  # in perspective 1 / depth is linear across the picture, depth is not
+        weight = weight / corners[which, :, 2]  # 1 / depth is linear across the picture, depth is not
         depth = 1.0 / weight.sum(axis=1)
         seen = np.einsum("fc,fci->fi", weight * depth[:, None], colors[which])
         self.fragments(pixels[which, where], depth, seen)
