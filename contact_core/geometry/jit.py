@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 from numba.core import event
+from numba.core.registry import CPUDispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -32,7 +33,7 @@ _kernels: set[int] = set()  # ids of our dispatchers: other people's kernels com
 
 # numba's cache asks whether a kernel's own file changed, but not whether the kernels that it calls did: machine
 # code compiled from older helpers would live on after an upgrade. So every kernel carries the stamp of them all.
-_files = [path.stat() for path in sorted(Path(__file__).parent.glob("*kernel*.py"))]
+_files = [path.stat() for path in sorted(Path(__file__).parents[1].glob("*/*kernel*.py"))]
 _stamp = (max(file.st_mtime for file in _files), sum(file.st_size for file in _files))
 
 
@@ -55,13 +56,31 @@ def inlined(function: Function) -> Function:
     A call hands over every array as seven numbers, so that calls cost more than what they called: workload W fell
     from 2.8 to 1.5 ms. For what runs for every window or crossing; code grows with every call of it.
     """
-    return _compiled(function, {**_OPTIONS, **_INNER, **_INLINED})
+    return _without_entry(_compiled(function, {**_OPTIONS, **_INNER, **_INLINED}))
 
 
 def inner(function: Function) -> Function:
     """A part of kernels that Python never calls: compiled without what Python would call it by, a third of the time
     that it takes to compile."""
-    return _compiled(function, {**_OPTIONS, **_INNER})
+    return _without_entry(_compiled(function, {**_OPTIONS, **_INNER}))
+
+
+class _Part(CPUDispatcher):  # type: ignore[misc]
+    """What has no entry for Python says so; a call would end the process."""
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        name = self.py_func.__name__
+        raise TypeError(
+            f"{name} is a part of kernels, compiled without an entry for Python, but was called from there: call a"
+            f" kernel that uses it, or {name}.py_func, which is the same in Python."
+        )
+
+
+def _without_entry(dispatcher: Any) -> Any:
+    """The dispatcher of a part; where numba refused the options it has an entry like any other."""
+    if _INNER:
+        dispatcher.__class__ = _Part
+    return dispatcher
 
 
 def _compiled(function: Function, options: dict[str, Any]) -> Function:

@@ -1,4 +1,4 @@
-"""Closing a hand at many placements at once: what `closing_kernels` computes, with its arrays made and named."""
+"""Closing a hand at many placements at once: what `hand_kernels` computes, with its arrays made and named."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def close_hands(
     radius of the round bar on which fingers close in place of the whole object, radius 0 for the object.
     curls: (N,) how far digits are bent before they close, of their limits. limits: (N, D) how far at most.
     """
-    from contact_core.grasping import closing_kernels as kernels
+    from contact_core.grasping import hand_kernels as kernels
 
     n, bones, digits = len(placed), len(hand.joints), len(hand.bones) - 1
     begins = kernels.Placed(
@@ -87,7 +87,8 @@ def close_hands(
 
 def _groups(hand: Hand) -> tuple[Any, Any, Any]:
     """The hand as kernels take it."""
-    from contact_core.grasping.closing_kernels import Chains, Skin, Starts
+    from contact_core.grasping.closing_kernels import Chains, Skin
+    from contact_core.grasping.hand_kernels import Starts
 
     starts = Starts(
         hand.starts, hand.start_counts, hand.start_angles, hand.start_prices, hand.looks, hand.look_frame,
@@ -98,7 +99,8 @@ def _groups(hand: Hand) -> tuple[Any, Any, Any]:
 
 
 def _working_memory(bones: int, digits: int) -> tuple[Any, Any]:
-    from contact_core.grasping.closing_kernels import Best, State
+    from contact_core.grasping.closing_kernels import State
+    from contact_core.grasping.hand_kernels import Best
 
     state = State(
         turns=np.zeros((bones, 3, 3)), angles=np.zeros(bones), frames=np.zeros((bones, 3, 4)),

@@ -105,6 +105,14 @@ def test_python_calls_no_part_of_a_kernel() -> None:
     assert called_from_python(made) == ["n: part"]
 
 
+def test_a_part_of_a_kernel_that_is_called_from_python_says_so() -> None:
+    from contact_core.geometry.topology_kernels import following
+
+    with pytest.raises(TypeError, match="following is a part of kernels"):
+        following(2)
+    assert following.py_func(2) == 0
+
+
 def test_unknown_names_are_refused_with_those_that_exist() -> None:
     import contact_core.geometry as geometry
 

@@ -11,8 +11,8 @@ import pytest
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.grasping.closing import ALONG, FOUND, TOUCH, Closed, close_hands, relaxed
-from contact_core.grasping.closing_kernels import between, turned_root
 from contact_core.grasping.hand import Hand, turn_about
+from contact_core.grasping.hand_kernels import between, turned_root
 from contact_core.grasping.screening import thumb_along
 from contact_core.rig.rig import forward_kinematics
 from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
