@@ -82,7 +82,24 @@ def test_all_names_of_hulls_are_known(tmp_path: Path, name: str) -> None:
 
 def test_a_file_of_hulls_alone_is_read(tmp_path: Path) -> None:
     nodes, scenes = [{"mesh": 0, "name": "UCX_mug"}], [{"nodes": [0]}]
-    assert len(read(changed(tmp_path, "e03_ucx_collision.glb", nodes=nodes, scenes=scenes)).mesh.points) == 110
+    asset = read(changed(tmp_path, "e03_ucx_collision.glb", nodes=nodes, scenes=scenes))
+    assert len(asset.mesh.points) == 110 and any("UCX_mug" in note for note in asset.notes)
+
+
+@pytest.mark.parametrize("name", ["mug_LOD1", "mug_LOD2", "mugCollider", "mug_collision", "Navmesh"])
+def test_coarser_copies_and_colliders_are_named_and_no_surface(tmp_path: Path, name: str) -> None:
+    nodes = [{"mesh": 0, "name": "mug"}, {"mesh": 0, "name": name, "translation": [3, 0, 0]}]
+    asset = read(changed(tmp_path, "e03_ucx_collision.glb", nodes=nodes, scenes=[{"nodes": [0, 1]}]))
+    assert len(asset.mesh.points) == 110 and any(name in note for note in asset.notes)
+    nodes[0]["name"] = "Vase_LOD0"  # of another mesh, so a LOD1 is the finest of its own
+    asset = read(changed(tmp_path, "e03_ucx_collision.glb", nodes=nodes, scenes=[{"nodes": [0, 1]}]))
+    assert len(asset.mesh.points) == (220 if "LOD" in name else 110)
+
+
+def test_a_group_of_hulls_is_left_out(tmp_path: Path) -> None:
+    nodes = [{"mesh": 0}, {"name": "Colliders", "children": [2]}, {"mesh": 0, "translation": [3, 0, 0]}]
+    asset = read(changed(tmp_path, "e03_ucx_collision.glb", nodes=nodes, scenes=[{"nodes": [0, 1]}]))
+    assert len(asset.mesh.points) == 110
 
 
 def test_visibility_holds_for_what_is_below(tmp_path: Path) -> None:

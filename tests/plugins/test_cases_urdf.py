@@ -241,6 +241,54 @@ def test_what_cannot_be_read_is_said_in_words(tmp_path: Path, inside: str, words
         read(tmp_path / "r.urdf", inside)
 
 
+HULL = BOX.replace("visual", "collision").replace("0.2 0.2 0.2", "0.4 0.4 0.4")
+
+
+def test_links_with_collision_shapes_only_are_read_and_that_is_said(tmp_path: Path) -> None:
+    joint = '<joint name="j" type="fixed"><parent link="p"/><child link="c"/><origin xyz="2 0 0"/></joint>'
+    asset = read(tmp_path / "r.urdf", f'<link name="p">{HULL}</link><link name="c">{HULL}</link>{joint}')
+    assert len(asset.mesh.faces) == 24 and any("<collision>" in note for note in asset.notes)
+    asset = read(tmp_path / "s.urdf", f'<link name="p">{BOX}</link><link name="c">{HULL}</link>{joint}')
+    assert len(asset.mesh.faces) == 12 and any("left out: c." in note for note in asset.notes)
+
+
+def test_a_damaged_collision_shape_costs_nothing(tmp_path: Path) -> None:
+    asset = read(tmp_path / "r.urdf", f'<link name="p">{BOX}{HULL.replace("0.4 0.4", "x")}</link>')
+    assert len(asset.mesh.faces) == 12 and not asset.notes
+
+
+@pytest.mark.parametrize(("name", "data"), [("gone.obj", ""), ("../out.obj", OBJ), ("bad.obj", "f 1 2 3\n")])
+def test_one_missing_mesh_is_named_and_the_rest_is_read(tmp_path: Path, name: str, data: str) -> None:
+    (tmp_path / "r").mkdir()
+    if data:
+        (tmp_path / "r" / name).write_text(data)
+    joint = '<joint name="j" type="fixed"><parent link="p"/><child link="a"/></joint>'
+    lost = mesh_visual(name)
+    asset = read(tmp_path / "r" / "r.urdf", f'<link name="p">{BOX}</link>{lost}{joint}')
+    assert len(asset.mesh.faces) == 12 and asset.rig is not None and "j" in asset.rig.joints
+    assert sum(f"{name} of a" in note for note in asset.notes) == 1
+    asset = read(
+        tmp_path / "r" / "r.urdf", f'<link name="p">{BOX}</link>{joint}{lost}'.replace("</link>", f"{HULL}</link>")
+    )
+    assert len(asset.mesh.faces) == 24 and any("<collision> shapes of a" in note for note in asset.notes)
+    with pytest.raises(FileRefused, match=name):
+        read(tmp_path / "r" / "r.urdf", lost)
+
+
+@pytest.mark.parametrize("space", ["http://www.ros.org", "https://drake.mit.edu"])
+def test_a_default_namespace_is_read_over(tmp_path: Path, space: str) -> None:
+    text = two('<joint name="j" type="revolute"><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>')
+    (tmp_path / "r.urdf").write_text(f'<robot name="r" xmlns="{space}">{text}</robot>')
+    rig = UrdfFiles().read(tmp_path / "r.urdf").rig
+    assert rig is not None and rig.freedoms[1].kind == "hinge" and len(rig.surface.faces) == 24
+
+
+@pytest.mark.parametrize(("limit", "noted"), [(90.0, True), (6.2832, False), (1.57, False), (180.0, True)])
+def test_limits_that_look_like_degrees_are_noted(tmp_path: Path, limit: float, noted: bool) -> None:
+    joint = f'<joint name="j" type="revolute"><limit lower="-{limit}" upper="{limit}"/>'
+    assert any("degrees" in note for note in read(tmp_path / "r.urdf", two(joint)).notes) is noted
+
+
 def chain(count: int) -> str:
     links = "".join(f'<link name="l{k}">{BOX}</link>' for k in range(count + 1))
     joints = "".join(
@@ -257,6 +305,21 @@ def test_a_long_chain_is_read_and_a_longer_one_refused(tmp_path: Path) -> None:
     assert np.isclose(rig.rest_world[-1, 2, 3], 450.0)
     with pytest.raises(FileRefused, match="5000 joints; 0 to 4096 are read"):
         read(tmp_path / "r.urdf", chain(5000))
+
+
+def test_hulls_of_a_collada_scene_are_named_and_no_surface(tmp_path: Path) -> None:
+    pytest.importorskip("collada")
+    body, hull = (
+        DAE[DAE.index("<geometry") : DAE.index("</library_geometries>")].replace(
+            'id="g"', f'id="{name}" name="{name}"'
+        )
+        for name in ("g", "UCX_g")
+    )
+    text = DAE.replace(body.replace(' name="g"', ""), body + hull.replace('"p', '"q').replace('"#p', '"#q'))
+    node = '<node><instance_geometry url="#UCX_g"/></node></visual_scene>'
+    (tmp_path / "m.dae").write_text(text.replace('"v"', '"v"').replace("</visual_scene>", node))
+    asset = SceneMeshFiles().read(tmp_path / "m.dae")
+    assert len(asset.mesh.points) == 5 and any("UCX_g" in note for note in asset.notes)
 
 
 class TestSceneMeshes(FormatContract):

@@ -75,8 +75,7 @@ REFUSED: dict[str, tuple[bytes | str, str]] = {
     "count_zero.stl": (b"x".ljust(80) + struct.pack("<I", 0) + FACETS, "has room for 12"),
     "headless.off": ("8 6 0\n" + POINTS + FACES, "first word is not OFF"),
     "sdf.urdf": ('<sdf version="1.6"/>', "where a URDF has <robot>"),
-    "hulls.urdf": ('<robot name="r"><link name="a"><collision><geometry><box size="1 1 1"/></geometry></collision>'
-                   "</link></robot>", "<visual>"),
+    "bare.urdf": ('<robot name="r"><link name="a"/></robot>', "<visual>"),
 }  # fmt: skip
 
 
@@ -95,6 +94,16 @@ def test_it_is_the_cube(tmp_path: Path, name: str) -> None:
     mesh = read_asset(written(tmp_path, name, RIGHT[name])).mesh
     assert len(mesh.points) == 8 and len(mesh.faces) == 12
     assert volume(mesh) == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("lines", ["o UCX_cube", "o Hull\ng cube_collider", "g Cube_LOD1"])
+def test_hulls_and_copies_of_an_obj_are_named_and_no_surface(tmp_path: Path, lines: str) -> None:
+    copy = "".join(f"f {a + 9} {b + 9} {c + 9} {d + 9}\n" for a, b, c, d in QUADS)
+    moved = "".join(f"v {x + 9:g} {y:g} {z:g}\n" for x, y, z in CORNERS)
+    asset = read_asset(written(tmp_path, "cube.obj", f"{lines}\n{moved}{F}o Cube\ng Cube\n{V}{copy}"))
+    assert volume(asset.mesh) == pytest.approx(8.0) and asset.mesh.points.max() == 2.0
+    assert any(lines.split()[-1] in note for note in asset.notes)
+    assert asset.source_faces is not None and sorted(set(asset.source_faces.tolist())) == list(range(6, 12))
 
 
 @pytest.mark.parametrize("name", REFUSED)

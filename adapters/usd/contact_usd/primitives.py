@@ -9,6 +9,7 @@ from pxr import Usd, UsdGeom
 
 from contact_core.errors import InvalidInput
 from contact_core.geometry import solids
+from contact_core.scene.mesh_names import MOST_AROUND, MeshNames, shown
 
 AS_IT_STANDS = Usd.TimeCode.EarliestTime()
 KINDS = ("Sphere", "Cube", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1", "Plane")
@@ -70,8 +71,23 @@ def drawn(prims: dict[str, Usd.Prim]) -> tuple[list[str], list[str]]:
             kept.append(path)
     if not kept and left["proxies"]:
         kept, left["proxies"] = left["proxies"], []
-    told = [f"not drawn, and left out: {kind} {', '.join(paths[:8])}." for kind, paths in left.items() if paths]
+    which, stand_ins = shown([names_of(prims[path]) for path in kept])
+    kept = [kept[k] for k in which]
+    told = [*stand_ins, *_not_drawn(left)]
     return kept, told
+
+
+def names_of(prim: Usd.Prim) -> MeshNames:
+    """What a mesh is called, and the prims above it."""
+    around, above = list[str](), prim.GetParent()
+    while above and not above.IsPseudoRoot() and len(around) < MOST_AROUND:
+        around.append(above.GetName())
+        above = above.GetParent()
+    return MeshNames((prim.GetName(),), tuple(around))
+
+
+def _not_drawn(left: dict[str, list[str]]) -> list[str]:
+    return [f"not drawn, and left out: {kind} {', '.join(paths[:8])}." for kind, paths in left.items() if paths]
 
 
 def silent_losses(stage: Usd.Stage, skinned: set[str]) -> list[str]:

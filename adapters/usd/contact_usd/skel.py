@@ -20,10 +20,11 @@ from contact_core.geometry.transform import transform_points
 from contact_core.geometry.triangulate import triangulate
 from contact_core.rig.rig import Rig, still_following
 from contact_core.scene.host import SceneSpace
+from contact_core.scene.mesh_names import shown
 from contact_core.scene.reading import stretch_rig
 from contact_usd.freedoms import read_freedoms
 from contact_usd.mesh import AS_IT_STANDS, matrix_of, placement_of, read_arrays
-from contact_usd.primitives import is_hidden, stands_in
+from contact_usd.primitives import is_hidden, names_of, stands_in
 
 INSTANCES = Usd.TraverseInstanceProxies()
 _FLAT = 1e-9  # volume of a unit cube in a joint's axes, made unit: below it the axes are as good as in one plane
@@ -69,24 +70,33 @@ def influenced_meshes(binding: UsdSkel.Binding) -> Iterator[UsdSkel.SkinningQuer
 
 
 def skinned_meshes(binding: UsdSkel.Binding) -> list[UsdSkel.SkinningQuery]:
-    """Those that are the skin: guides and proxies only where there is nothing else.
+    """Those that are the skin: guides and proxies, hulls and coarser copies only where there is nothing else.
 
-    Purposes alone decide: what an artist hides for a while stays part of the skin that patches lie on.
+    Purposes and names decide: what an artist hides for a while stays part of the skin that patches lie on.
     """
+    return _skin_and_notes(binding)[0]
+
+
+def _skin_and_notes(binding: UsdSkel.Binding) -> tuple[list[UsdSkel.SkinningQuery], list[str]]:
     every = list(influenced_meshes(binding))
-    return [query for query in every if not stands_in(query.GetPrim())] or every
+    drawn = [query for query in every if not stands_in(query.GetPrim())] or every
+    kept, notes = shown([names_of(query.GetPrim()) for query in drawn])
+    return [drawn[k] for k in kept], notes
 
 
 def losses(binding: UsdSkel.Binding) -> list[str]:
     """Notes on meshes of a rig that are left out of its skin, or that are in it and cannot be seen."""
-    skin = {str(query.GetPrim().GetPath()): query.GetPrim() for query in skinned_meshes(binding)}
-    every = [str(query.GetPrim().GetPath()) for query in influenced_meshes(binding)]
+    queries, notes = _skin_and_notes(binding)
+    skin = {str(query.GetPrim().GetPath()): query.GetPrim() for query in queries}
+    others = [query.GetPrim() for query in influenced_meshes(binding) if str(query.GetPrim().GetPath()) not in skin]
     unseen = [path for path, prim in skin.items() if is_hidden(prim)]
     told = {
-        "guides and proxies of the rig, left out of its skin": [path for path in every if path not in skin],
+        "guides and proxies of the rig, left out of its skin": [
+            str(prim.GetPath()) for prim in others if stands_in(prim)
+        ],
         "invisible, and part of the rig all the same": unseen if len(unseen) < len(skin) else [],
     }
-    return [f"{what}: {', '.join(paths[:8])}." for what, paths in told.items() if paths]
+    return [*notes, *(f"{what}: {', '.join(paths[:8])}." for what, paths in told.items() if paths)]
 
 
 def joint_names(skeleton: UsdSkel.Skeleton) -> tuple[str, ...]:

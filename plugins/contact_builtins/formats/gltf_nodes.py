@@ -14,9 +14,6 @@ from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import InvalidInput
 
 MAX_NODES = 200_000
-# Hulls for physics engines: never drawn. Unreal's prefixes, and the endings that Godot's importer takes.
-HULL_PREFIXES = ("ucx_", "ubx_", "usp_", "ucp_", "mcdcx_")
-HULL_ENDINGS = ("-colonly", "-convcolonly", "_colonly", "_convcolonly")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +53,6 @@ def read_nodes(gltf: Gltf) -> Nodes:
     names = tuple(str(entry.get("name") or f"node_{index}") for index, entry in enumerate(entries))
     hidden = _hidden(entries, order, parents, world)
     return Nodes(names, parents, world, order, _shown(gltf, order, parents), hidden, tuple(notes))
-
-
-def is_hull(*names: str) -> bool:
-    """Whether any of these names says that a mesh is a collision hull."""
-    return any(name.lower().startswith(HULL_PREFIXES) or name.lower().endswith(HULL_ENDINGS) for name in names)
 
 
 def _hidden(

@@ -12,11 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from contact_builtins.formats.gltf_container import COMPRESSED, INSTANCING, Gltf
 from contact_builtins.formats.gltf_draco import without_draco
-from contact_builtins.formats.gltf_nodes import Nodes, is_hull
+from contact_builtins.formats.gltf_nodes import Nodes
 from contact_builtins.formats.refusal import NoSurface, bounded, named
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.errors import FileRefused, InvalidInput
 from contact_core.geometry.transform import transform_points
+from contact_core.scene.mesh_names import MOST_AROUND, MeshNames, shown
 
 POINTS, LINES, TRIANGLES, STRIP, FAN = 0, (1, 2, 3), 4, 5, 6
 MAX_COPIES = 50_000  # of meshes by nodes, and of vertices and faces that no bytes of the file pay for
@@ -63,25 +64,25 @@ def read_parts(gltf: Gltf, nodes: Nodes) -> tuple[list[Part], list[str]]:
     meshes = [index for index in nodes.order if index in nodes.active and "mesh" in gltf.entry("nodes", index)]
     bounded(len(meshes), "nodes with meshes", MAX_COPIES)
     drawn = [index for index in meshes if index not in nodes.hidden]
-    hulls = [index for index in drawn if is_hull(nodes.names[index], _mesh_name(gltf, index))]
-    if len(hulls) == len(drawn):
-        hulls = []  # a file of nothing but hulls is read for their sake
-    reading = _Reading(notes=dict.fromkeys(nodes.notes))
-    skipped = set(hulls)
-    parts = [part for index in drawn if index not in skipped for part in _node_parts(gltf, nodes, index, reading)]
+    kept, stand_ins = shown([_names(gltf, nodes, index) for index in drawn])
+    reading = _Reading(notes=dict.fromkeys((*nodes.notes, *stand_ins)))
+    parts = [part for k in kept for part in _node_parts(gltf, nodes, drawn[k], reading)]
     hidden = [nodes.names[index] for index in meshes if index in nodes.hidden]
     if hidden:
         reading.notes[f"Hidden meshes were left out, as a viewer leaves them: {named(hidden)}."] = None
-    if hulls:
-        told = named([nodes.names[index] for index in hulls])
-        reading.notes[f"Collision hulls, which are never drawn, were left out: {told}."] = None
     if not parts and hidden:
         raise NoSurface(f"shows no triangles: hidden are {named(hidden)}. Make one of them visible.")
     return parts, list(reading.notes)
 
 
-def _mesh_name(gltf: Gltf, node: int) -> str:
-    return str(gltf.entry("meshes", gltf.entry("nodes", node)["mesh"]).get("name") or "")
+def _names(gltf: Gltf, nodes: Nodes, index: int) -> MeshNames:
+    """What the node of a mesh is called, its mesh, and the nodes above it."""
+    mesh = gltf.entry("meshes", gltf.entry("nodes", index)["mesh"]).get("name")
+    around, above = list[str](), int(nodes.parents[index])
+    while above >= 0 and len(around) < MOST_AROUND:
+        around.append(nodes.names[above])
+        above = int(nodes.parents[above])
+    return MeshNames((nodes.names[index], *([str(mesh)] if mesh else [])), tuple(around))
 
 
 def _node_parts(gltf: Gltf, nodes: Nodes, node: int, reading: _Reading) -> list[Part]:

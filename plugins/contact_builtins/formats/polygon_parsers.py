@@ -8,15 +8,16 @@ raises InvalidInput with the line or face that is wrong; `refusal.refusing` make
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from contact_builtins.formats.polygons import Polygons
 from contact_builtins.formats.refusal import bounded
 from contact_builtins.formats.words import numbers, plain, whole, wholes, without_comment
-from contact_core.arrays import IntArray
+from contact_core.arrays import BoolArray, IntArray
 from contact_core.errors import InvalidInput
+from contact_core.scene.mesh_names import MeshNames, shown
 
 _OFF_HEAD = re.compile(rb"\s*(ST)?(C)?(N)?(4)?(n)?OFF(?![A-Za-z_])[ \t]*(BINARY)?", re.IGNORECASE)
 _OBJ_LOOSE = {b"l", b"p", b"curv", b"curv2", b"surf"}
@@ -33,6 +34,9 @@ def parse_obj(data: bytes) -> Polygons:
     face_lines: list[int] = []
     sizes: list[int] = []
     before: list[int] = []  # how many vertices stand before each face
+    named: dict[tuple[bytes, bytes], int] = {(b"", b""): 0}  # object and group, numbered
+    within, group_of = {b"o": b"", b"g": b""}, list[int]()
+    current = 0
     loose = 0
     for number, line in _obj_lines(plain(data)):
         words = without_comment(line).split()
@@ -47,6 +51,10 @@ def parse_obj(data: bytes) -> Polygons:
             face_lines.append(number)
             sizes.append(len(words) - 1)
             before.append(len(vertex_lines))
+            group_of.append(current)
+        elif kind in (b"o", b"g"):
+            within[kind] = b" ".join(words[1:])
+            current = named.setdefault((within[b"o"], within[b"g"]), len(named))
         loose += kind in _OBJ_LOOSE
     if loose and not sizes:
         raise InvalidInput("it holds points, lines or curves, but no faces")
@@ -54,7 +62,18 @@ def parse_obj(data: bytes) -> Polygons:
     size_of = np.array(sizes, np.int64)
     indices = _obj_indices(corners, np.repeat(face_lines, size_of), np.repeat(before, size_of), len(points))
     notes = (f"{loose} points, lines and curves were left out; only faces make a surface.",) if loose else ()
-    return Polygons(points, size_of, indices, notes)
+    kept, told = _without_stand_ins(named, np.array(group_of, np.int64))
+    return Polygons(points, size_of, indices, (*notes, *told), kept)
+
+
+def _without_stand_ins(
+    named: Iterable[tuple[bytes, bytes]], group_of: IntArray
+) -> tuple[BoolArray | None, list[str]]:
+    """Faces that are a surface by the names of their objects and groups, and notes. group_of: (f,)."""
+    there = np.unique(group_of)
+    names = [tuple(name.decode("utf-8", "replace") for name in both if name) or ("",) for both in named]
+    kept, notes = shown([MeshNames(names[k]) for k in there.tolist()])
+    return (np.isin(group_of, there[kept]) if len(kept) < len(there) else None), notes
 
 
 def _obj_indices(corners: list[bytes], lines: IntArray, before: IntArray, count: int) -> IntArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact_builtins.formats.refusal import NO_FACES, NoSurface
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.errors import InvalidInput
 from contact_core.geometry.sound import sound_polygons
 from contact_core.geometry.triangulate import triangulate
@@ -16,12 +16,13 @@ from contact_core.geometry.triangulate import triangulate
 @dataclass(frozen=True, eq=False)
 class Polygons:
     """What a file says. points: (n, 3). sizes: (f,) corners per polygon. indices: (sum of sizes,). notes: sentences
-    on what the file holds besides."""
+    on what the file holds besides. kept: (f,) polygons that are part of the surface; None for all."""
 
     points: FloatArray
     sizes: IntArray
     indices: IntArray
     notes: tuple[str, ...] = ()
+    kept: BoolArray | None = None
 
     @classmethod
     def of_triangles(cls, points: FloatArray, faces: IntArray) -> Polygons:
@@ -46,16 +47,20 @@ def surface_of(polygons: Polygons, weld_groups: IntArray | None = None) -> Surfa
 
     weld_groups: (n,) labels; points of different labels never merge (skins whose weights differ at a seam).
     """
-    points, indices = polygons.points, polygons.indices
+    points, sizes, indices = polygons.points, polygons.sizes, polygons.indices
     if len(indices) and not (indices.min() >= 0 and indices.max() < len(points)):
         raise InvalidInput(f"faces name vertex {int(indices.max())} or {int(indices.min())} of {len(points)}")
+    numbers = np.arange(len(sizes))
+    if polygons.kept is not None:
+        numbers = numbers[polygons.kept]
+        sizes, indices = sizes[numbers], indices[np.repeat(polygons.kept, sizes)]
     used, corners = np.unique(indices, return_inverse=True)
     finite = np.isfinite(points[used]).all(axis=1)
     if not finite.all():
         bad = int(used[np.argmin(finite)])
         raise InvalidInput(f"vertex {bad} is at {points[bad].tolist()}, which is not finite, and a face uses it")
     apart = None if weld_groups is None else weld_groups[used]
-    sound = sound_polygons(points[used], polygons.sizes, corners.reshape(-1), apart=apart)
+    sound = sound_polygons(points[used], sizes, corners.reshape(-1), apart=apart)
     triangles, cut, notes = triangulate(sound.sizes, sound.indices, points[used[sound.first]])
     if not len(triangles):
         raise NoSurface(NO_FACES)
@@ -70,7 +75,7 @@ def surface_of(polygons: Polygons, weld_groups: IntArray | None = None) -> Surfa
         faces=renumber[triangles],
         source_vertices=source_vertices,
         first_source=first_source,
-        source_faces=sound.face_of[cut],
+        source_faces=numbers[sound.face_of[cut]],
         notes=(*_unused_notes(len(points) - len(used)), *sound.notes, *notes),
     )
 

@@ -20,6 +20,7 @@ from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import Pose
+from contact_core.scene.mesh_names import MeshNames, shown
 
 Placed = tuple[FloatArray, IntArray, IntArray]  # points (n, 3), corners per face (f,), point of each corner
 Parsed = tuple[list[Placed], float, Literal["X", "Y", "Z"], list[str]]
@@ -90,10 +91,10 @@ def parse_dae(data: bytes) -> Parsed:
         objects = (
             [] if scene.scene is None else [*scene.scene.objects("geometry"), *scene.scene.objects("controller")]
         )
-        parts = list(_dae_parts(objects))
+        kept, notes = shown([_dae_names(item) for item in objects])
+        parts = list(_dae_parts([objects[k] for k in kept]))
     except collada.common.DaeError as error:
         raise InvalidInput(f"pycollada says: {' '.join(str(error).split())[:120]}") from error
-    notes = []
     if any(hasattr(item, "skin") for item in objects):
         notes.append("The file's skin was read as it stands; for a rig, export glTF or USD.")
     up = {"X_UP": "X", "Z_UP": "Z"}.get(str(scene.assetInfo.upaxis), "Y")
@@ -101,6 +102,14 @@ def parse_dae(data: bytes) -> Parsed:
     if not 0 < unit < float("inf"):
         raise InvalidInput(f"its unit is {unit:g} metres")
     return parts, unit, up, notes  # type: ignore[return-value]
+
+
+def _dae_names(item: Any) -> MeshNames:
+    """The name of a geometry and its id, by which exporters tell what it is; pycollada keeps no names of nodes."""
+    geometry = getattr(item, "original", item)
+    geometry = getattr(geometry, "geometry", geometry)
+    told = [getattr(geometry, key, None) for key in ("name", "id")]
+    return MeshNames(tuple(str(name) for name in told if name) or ("",))
 
 
 def _dae_parts(objects: list[Any]) -> Iterator[Placed]:

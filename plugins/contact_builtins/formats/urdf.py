@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,12 @@ from contact_builtins.formats.urdf_paths import MeshPaths
 from contact_builtins.formats.urdf_xml import Joint, Link, Mimic, Visual, parse_urdf, turn
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.document.asset import Asset
-from contact_core.errors import FileRefused, InvalidInput
+from contact_core.errors import FileRefused, InvalidInput, MissingExtra, shortened
 from contact_core.geometry import solids
 from contact_core.geometry.transform import transform_points
 from contact_core.rig.rig import JointFreedom, Rig, forward_kinematics
+
+_TURNS = 2 * np.pi + 0.01  # a limit beyond is no stop of a finger, and mostly one in degrees
 
 
 class UrdfFiles:
@@ -115,10 +117,20 @@ def _joint_notes(joints: tuple[Joint, ...]) -> list[str]:
         notes.append(
             f"The limits of {named(unsaid)} leave out lower or upper; the URDF specification takes 0 for it."
         )
+    degrees = [joint.name for joint in joints if joint.limits and max(map(abs, joint.limits)) > _TURNS]
+    if degrees:
+        notes.append(
+            f"The limits of {named(degrees)} are far beyond a turn ({_largest(joints):g}), as if they were degrees;"
+            " URDF takes them for radians, and so they were read."
+        )
     free = [joint.name for joint in joints if joint.kind == "revolute" and joint.limits is None]
     if free:
         notes.append(f"Revolute joints without the limit that URDF asks for turn freely: {named(free)}.")
     return notes
+
+
+def _largest(joints: tuple[Joint, ...]) -> float:
+    return max(abs(limit) for joint in joints for limit in joint.limits or ())
 
 
 def _rig(paths: MeshPaths, links: tuple[Link, ...], joints: tuple[Joint, ...]) -> tuple[Rig, IntArray, list[str]]:
@@ -160,35 +172,104 @@ def _rig(paths: MeshPaths, links: tuple[Link, ...], joints: tuple[Joint, ...]) -
 def _skin(
     paths: MeshPaths, links: tuple[Link, ...], joint_of_link: dict[str, int], world: FloatArray
 ) -> tuple[FloatArray, IntArray, IntArray, list[str]]:
-    """All visuals at rest: points (n, 3), faces (m, 3), the joint of each point (n,), and notes."""
+    """All shapes at rest: points (n, 3), faces (m, 3), the joint of each point (n,), and notes.
+
+    Raises FileRefused where no link has a shape that can be read.
+    """
+    reading = _Reading(paths)
+    hulls = not any(link.visuals for link in links)
     points, faces, owners = list[FloatArray](), list[IntArray](), list[IntArray]()
-    notes: dict[str, None] = {}
-    known: dict[Path, solids.Solid] = {}
     total, size = 0, 0
     for link in links:
-        for visual in link.visuals:
-            solid = _solid(paths, visual, known, notes)
-            if solid is None:
-                notes[f"A visual of link {link.name!r} is a <{visual.kind}>, which is not known; left out."] = None
-                continue
-            joint = joint_of_link[link.name]
-            placed = world[joint] @ visual.origin
+        joint = joint_of_link[link.name]
+        for visual, solid in reading.shapes_of(link, hulls):
             size = bounded(size + len(solid[0]) + len(solid[1]), "vertices and faces of links in all")
             faces.append(solid[1] + total)
-            points.append(transform_points(placed, solid[0]))
+            points.append(transform_points(world[joint] @ visual.origin, solid[0]))
             owners.append(np.full(len(solid[0]), joint))
             total += len(solid[0])
     if not points:
+        if reading.refused is not None:
+            raise reading.refused
         raise NoSurface(
             "gives none of its links a <visual> with a shape, so there is nothing to touch with; add some."
         )
-    return np.concatenate(points), np.concatenate(faces), np.concatenate(owners), list(notes)
+    return np.concatenate(points), np.concatenate(faces), np.concatenate(owners), reading.told(hulls)
+
+
+@dataclass
+class _Reading:
+    """The shapes of links as they are read. refused: why the first mesh that could not be read was refused.
+
+    missing: by link the meshes that could not be read; replaced: links that stand in their collision shapes for it.
+    """
+
+    paths: MeshPaths
+    known: dict[Path, solids.Solid | FileRefused | MissingExtra] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
+    missing: dict[str, list[str]] = field(default_factory=dict)
+    replaced: list[str] = field(default_factory=list)
+    unseen: list[str] = field(default_factory=list)
+    refused: FileRefused | MissingExtra | None = None
+
+    def shapes_of(self, link: Link, hulls: bool) -> list[tuple[Visual, solids.Solid]]:
+        """What is drawn of a link; its collision shapes where nothing of that can be read, or `hulls` asks for
+        them."""
+        if hulls:
+            return self._read(link, link.collisions)
+        found = self._read(link, link.visuals)
+        if found or not link.collisions:
+            return found
+        if not link.visuals:
+            self.unseen.append(link.name)
+            return []
+        found = self._read(link, link.collisions)
+        if found:
+            self.replaced.append(link.name)
+        return found
+
+    def told(self, hulls: bool) -> list[str]:
+        """The notes on all of it."""
+        told = []
+        if hulls:
+            told.append("No link has a <visual>: its <collision> shapes, which are often coarser, are the surface.")
+        if self.unseen:
+            told.append(
+                f"Links with a <collision> and no <visual> are not drawn, and left out: {named(self.unseen)}."
+            )
+        if self.missing:
+            names = [f"{', '.join(dict.fromkeys(files))} of {link}" for link, files in self.missing.items()]
+            told.append(f"Meshes that could not be read were left out: {named(names)}. {self.refused}")
+        if self.replaced:
+            told.append(f"In place of such meshes stand the <collision> shapes of {named(self.replaced)}.")
+        return [*told, *self.notes]
+
+    def _read(self, link: Link, visuals: Sequence[Visual]) -> list[tuple[Visual, solids.Solid]]:
+        found = []
+        for visual in visuals:
+            try:
+                solid = _solid(self.paths, visual, self.known, self.notes)
+            except (FileRefused, MissingExtra) as error:
+                self.refused = self.refused or error
+                self.missing.setdefault(link.name, []).append(shortened(visual.filename))
+                continue
+            if solid is None:
+                self.notes[f"A shape of link {link.name!r} is a <{visual.kind}>, which is not known; left out."] = (
+                    None
+                )
+                continue
+            found.append((visual, solid))
+        return found
 
 
 def _solid(
-    paths: MeshPaths, visual: Visual, known: dict[Path, solids.Solid], notes: dict[str, None]
+    paths: MeshPaths,
+    visual: Visual,
+    known: dict[Path, solids.Solid | FileRefused | MissingExtra],
+    notes: dict[str, None],
 ) -> solids.Solid | None:
-    """Points and faces of a visual in its own frame; None for a kind that is not known."""
+    """Points and faces of a visual in its own frame; None for a kind that is not known. known: meshes read before,
+    and why some were refused. Raises FileRefused, MissingExtra."""
     if visual.kind != "mesh":
         makers: dict[str, Callable[..., solids.Solid]] = {
             "box": solids.box,
@@ -199,10 +280,16 @@ def _solid(
         return makers[visual.kind](*visual.sizes) if visual.kind in makers else None
     path = paths.find(visual.filename)
     if path not in known:
-        mesh, told = read_any_mesh(path)
-        known[path] = (mesh.points, mesh.faces)
-        notes |= dict.fromkeys(f"{visual.filename}: {note}" for note in told)
-    points, faces = known[path]
+        try:
+            mesh, told = read_any_mesh(path)
+            known[path] = (mesh.points, mesh.faces)
+            notes |= dict.fromkeys(f"{visual.filename}: {note}" for note in told)
+        except (FileRefused, MissingExtra) as error:
+            known[path] = error
+    solid = known[path]
+    if isinstance(solid, Exception):
+        raise solid
+    points, faces = solid
     scale = np.array(visual.sizes)
     return points * scale, faces if np.prod(scale) > 0 else faces[:, ::-1]
 

@@ -23,8 +23,9 @@ _MACRO = re.compile(r"\$[{(]")
 
 @dataclass(frozen=True, eq=False)
 class Visual:
-    """One visual of a link. origin: (4, 4) link_from_visual. kind: "box", "mesh"...; sizes as the kind needs them.
+    """One shape of a link, drawn or for collisions. origin: (4, 4) link_from_visual.
 
+    kind: "box", "mesh"...; sizes as the kind needs them.
     box: three edges; sphere: radius; cylinder, capsule: radius, length; mesh: scale (3), and `filename`.
     """
 
@@ -36,8 +37,11 @@ class Visual:
 
 @dataclass(frozen=True, eq=False)
 class Link:
+    """visuals: what is drawn. collisions: what physics meets instead."""
+
     name: str
     visuals: tuple[Visual, ...]
+    collisions: tuple[Visual, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,9 +82,10 @@ def parse_urdf(path: Path) -> tuple[tuple[Link, ...], tuple[Joint, ...]]:
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         said = str(error) if isinstance(error, ElementTree.ParseError) else "its encoding is not known"
         raise FileRefused(f"{path} was to be a URDF file, but cannot be parsed: {said}. Check its XML.") from error
-    if root.tag != "robot":
+    if root.tag.rpartition("}")[2] != "robot":
         raise InvalidInput(f"its outermost element is <{root.tag[:60]}>, where a URDF has <robot>")
     _check_expanded(path, root)
+    _without_namespace(root)
     links = tuple(_link(entry) for entry in root.findall("link"))
     joints = tuple(_joint(entry) for entry in root.findall("joint"))
     for what, names in (("link", [link.name for link in links]), ("joint", [joint.name for joint in joints])):
@@ -88,6 +93,14 @@ def parse_urdf(path: Path) -> tuple[tuple[Link, ...], tuple[Joint, ...]]:
         if twice:
             raise InvalidInput(f"it has two {what}s named {twice[0]!r}; names are unique in a URDF")
     return links, joints
+
+
+def _without_namespace(root: ElementTree.Element) -> None:
+    """Takes the default namespace off all tags: URDF has none, and some tools write one."""
+    space = root.tag.rpartition("}")[0]
+    for element in root.iter() if space else ():
+        if str(element.tag).startswith(space + "}"):
+            element.tag = str(element.tag).rpartition("}")[2]
 
 
 def _check_expanded(path: Path, root: ElementTree.Element) -> None:
@@ -104,11 +117,17 @@ def _check_expanded(path: Path, root: ElementTree.Element) -> None:
 
 def _link(entry: ElementTree.Element) -> Link:
     name = _named(entry, "link")
-    return Link(name, tuple(visual for item in entry.findall("visual") for visual in _visuals(item, name)))
+    visuals = [shape for item in entry.findall("visual") for shape in _shapes(item, f"a visual of link {name!r}")]
+    try:
+        hulls = [
+            shape for item in entry.findall("collision") for shape in _shapes(item, f"a collision of link {name!r}")
+        ]
+    except InvalidInput:  # mostly used by nobody here, so a damaged one costs nothing
+        hulls = []
+    return Link(name, tuple(visuals), tuple(hulls))
 
 
-def _visuals(entry: ElementTree.Element, link: str) -> Iterator[Visual]:
-    whose = f"a visual of link {link!r}"
+def _shapes(entry: ElementTree.Element, whose: str) -> Iterator[Visual]:
     origin = _origin(entry.find("origin"), whose)
     for shape in entry.findall("geometry/*"):
         if shape.tag == "mesh":

@@ -96,6 +96,18 @@ def test_guides_and_proxies_of_a_rig_are_named_and_no_skin(tmp_path: Path, word:
     assert host.selections("/R/S") == ()
 
 
+@pytest.mark.parametrize("name", ["UCX_body", "body_LOD1", "body_collider"])
+def test_hulls_and_coarser_copies_are_named_and_no_surface(tmp_path: Path, name: str) -> None:
+    asset = read(rig_of_parts(tmp_path / "rig.usda", body="default", **{name: "default"}))
+    assert np.isclose(volume(asset.mesh), 1.0) and sum(name in note for note in asset.notes) == 1
+    stage = Usd.Stage.CreateNew(str(tmp_path / "s.usda"))
+    for there in ("body", name):
+        UsdGeom.Cube.Define(stage, f"/{there}")
+    stage.Save()
+    asset = read(tmp_path / "s.usda")
+    assert np.isclose(volume(asset.mesh), 8.0) and sum(name in note for note in asset.notes) == 1
+
+
 def test_a_rig_of_guides_alone_is_read(tmp_path: Path) -> None:
     asset = read(rig_of_parts(tmp_path / "s.usda", skin="guide", other="guide"))
     assert np.isclose(volume(asset.mesh), 2.0) and not asset.notes
