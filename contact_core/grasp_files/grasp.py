@@ -22,6 +22,7 @@ from contact_core.document.schema import dump_document
 from contact_core.edit.command import apply_command
 from contact_core.errors import Cancelled, ContactError, InvalidInput
 from contact_core.geometry.transform import transform_points
+from contact_core.grasp_files.grounds import without_grounds
 from contact_core.grasping.finishing import Suggestion
 from contact_core.grasping.pads import remark_on_size
 from contact_core.grasping.scene import GraspScene
@@ -116,6 +117,8 @@ def prepare(hand: str, thing: str, scale: float, plugins: PluginManager) -> Gras
         raise InvalidInput(f"{manipulator.name} has no skeleton, so it is no hand; give the hand first.")
     unit = manipulator.rig.meters_per_unit
     length = manipulator_length(manipulator.rig)
+    factor = scale * (1.0 if raw.meters_per_unit is None else raw.meters_per_unit / unit)
+    raw, ground = without_grounds(raw, length / abs(factor)) if factor else (raw, None)
     mesh = object_mesh(raw, ObjectSpec(AssetSource(file=str(thing)), scale=scale), unit, length)
     name = f"{raw.name} (object)" if raw.name == manipulator.name else raw.name
     placed = Asset(
@@ -126,6 +129,7 @@ def prepare(hand: str, thing: str, scale: float, plugins: PluginManager) -> Gras
     session.surfaces.add(OBJECT, mesh, meters_per_unit=unit, up_axis=raw.up_axis)
     words = tuple(HandWords(**each) for each in manipulator.details.get("hands", ()))
     notes = [f"{asset.name}: {note}" for asset in (manipulator, raw) for note in asset.notes]
+    notes += [] if ground is None else [ground]
     if raw.meters_per_unit is None:
         notes.append(f"{raw.name} says no unit; the hand's was taken. Give --scale where it has another size.")
     return GraspJob(session, manipulator, placed, words, notes)

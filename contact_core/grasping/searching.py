@@ -81,7 +81,7 @@ def screened(
         rough = _closed(hand.quick, field, approaches)
         values = _looked_at(scene, approaches, rough, at)
         best = _shared_out(approaches, values, SECOND_LOOK)
-        approaches = approaches[best]
+        approaches, values = approaches[best], values[best]
     progress.tell(0.6, "Turning the thumb")
     closed = _closed(hand, field, approaches)
     value = values
@@ -135,9 +135,10 @@ def chosen(hand: Hand, approaches: Approaches, value: FloatArray, seen: FloatArr
     where there are such; none is like one before it. Where these are few, as on a ball, which looks the same from
     everywhere, others follow that are somewhat like them: a search that ends a little elsewhere may succeed."""
     names = np.array(approaches.kinds)
+    least = min(value.max(initial=-np.inf) - WORSE, HOPELESS)
     queues: dict[str, list[int]] = {}
     for kind in dict.fromkeys(approaches.kinds):
-        own = np.flatnonzero((names == kind) & (value >= min(value.max() - WORSE, HOPELESS)))
+        own = np.flatnonzero((names == kind) & (value >= least))
         order = own[np.argsort(-value[own], kind="stable")]
         queues[kind] = distinct(seen, order, count, hand.length).tolist()
     turn = [*(kind for kind in TURNS if kind in queues), *(kind for kind in queues if kind not in TURNS)]
@@ -145,6 +146,6 @@ def chosen(hand: Hand, approaches: Approaches, value: FloatArray, seen: FloatArr
     while any(queues.values()) and len(result) < count:
         result.extend(queues[kind].pop(0) for kind in turn if queues[kind])
     first = distinct(seen, np.array(result, np.int64), count, hand.length)
-    others = np.setdiff1d(np.flatnonzero(value >= min(value.max() - WORSE, HOPELESS)), first)
+    others = np.setdiff1d(np.flatnonzero(value >= least), first)
     others = others[np.argsort(-value[others], kind="stable")]
     return distinct(seen, np.concatenate([first, others]), count, hand.length, LIKE * ALIKE)

@@ -26,7 +26,7 @@ def object_mesh(asset: Asset, spec: ObjectSpec, meters_per_unit: float, length: 
     if not 1.0 / _MOST_LENGTHS <= share <= _MOST_LENGTHS:
         raise InvalidInput(
             f"the object {asset.name} is {share:.2g} lengths of the manipulator across; mend object.scale, or the"
-            " units of one of the two files (`contact inspect` tells them)."
+            " units of one of the two files (`contact inspect` tells them), or leave its ground out of the file."
         )
     return asset.mesh if factor == 1.0 else TriangleMesh(asset.mesh.points * factor, asset.mesh.faces)
 
