@@ -322,6 +322,35 @@ def test_hulls_of_a_collada_scene_are_named_and_no_surface(tmp_path: Path) -> No
     assert len(asset.mesh.points) == 5 and any("UCX_g" in note for note in asset.notes)
 
 
+NODE = '<node><translate>0 0 7</translate><instance_geometry url="#g"/></node>'
+PAINTED = (
+    '<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="a" target="#gone"/>'
+    "</technique_common></bind_material></instance_geometry>"
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "height", "unit", "noted"),
+    [
+        ('<instance_geometry url="#g"/>', PAINTED, 7.0, 0.01, ""),
+        (NODE, "", 0.0, 0.01, "shows none of its shapes"),
+        (NODE, NODE + '<node><instance_geometry url="#gone"/></node>', 7.0, 0.01, "gone"),
+        (NODE, NODE + NODE.replace("<node>", '<node name="UCX_a">').replace("7", "9"), 7.0, 0.01, "UCX_a"),
+        ('meter="0.01"', 'meter="0,01"', 7.0, 0.01, ""),
+        ('meter="0.01"', 'meter="a"', 7.0, 1.0, "is no length"),
+    ],
+)
+def test_collada_as_tools_write_it(
+    tmp_path: Path, old: str, new: str, height: float, unit: float, noted: str
+) -> None:
+    pytest.importorskip("collada")
+    (tmp_path / "m.dae").write_text(DAE.replace(old, new))
+    asset = SceneMeshFiles().read(tmp_path / "m.dae")
+    assert len(asset.mesh.points) == 5 and np.allclose(asset.mesh.points[:, 2], height)
+    assert asset.meters_per_unit == unit
+    assert bool(asset.notes) == bool(noted) and noted in " ".join(asset.notes)
+
+
 class TestSceneMeshes(FormatContract):
     cannot = {"writing": "a .glb is what is written", "rigs": "rigs come by glTF or USD"}
 

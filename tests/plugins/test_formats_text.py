@@ -208,7 +208,7 @@ REFUSED = {
     "zero byte": ("m.obj", OBJ.replace(b"v 1 0 0", b"v 1\0 0 0"), r"line 2: '1\?' is not a number"),
     "only lines": ("m.obj", OBJ[: OBJ.index(b"f")] + b"l 1 2\n", "points, lines or curves, but no faces"),
     "vertex of two": ("m.obj", OBJ.replace(b"v 1 0 0", b"v 1 0"), "line 2 is a vertex with 2 coordinates"),
-    "no number in use": ("m.obj", OBJ.replace(b"v 1 0 0", b"v 1.#QNAN 0 0"), "not finite"),
+    "no number in use": ("m.obj", OBJ.replace(b"v ", b"v 1.#QNAN "), "not finite"),
     "broken UTF-16": ("m.obj", b"\xff\xfe" + OBJ.decode().encode("utf-16-le")[:-1], "begins as UTF-16 text"),
     "empty OBJ": ("m.obj", b"", "it is empty"),
     "blank OFF": ("m.off", b" \n\n", "it is empty"),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import struct
+import zipfile
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,10 @@ RIGHT: dict[str, bytes | str] = {
     "big_with_uv.ply": header("binary_big_endian",
         "element face 6\nproperty uint8 f\nproperty list uint8 uint32 vertex_index\nproperty list uint8 float32 uv")
     + CORNERS.astype(">f4").tobytes() + b"".join(struct.pack(">BB4IB8f", 0, 4, *q, 8, *range(8)) for q in QUADS),
+    "capitals.ply": header("ascii", USHORT_FACES).replace(b" x", b" X").replace(b" y", b" Y").replace(b" z", b" Z")
+    .replace(b"vertex_indices", b"Vertex_Indices") + (POINTS + FACES).encode(),
+    "one_odd_facet.stl": b"x".ljust(80) + struct.pack("<I", 13) + struct.pack("<12fH", *[np.nan] * 12, 0) + FACETS,
+    "one_odd_face.obj": V + "v nan 0 0\n" + F + "f 1 2 9\n",
     "no_end.stl": "solid\n" + ASCII,
     "named_facet.stl": "solid facet outer loop vertex 1 2 3\n" + ASCII + "endsolid\n",
     "one_line.stl": " ".join(("solid x\n" + ASCII).split()) + " endsolid x",
@@ -94,6 +99,72 @@ def test_it_is_the_cube(tmp_path: Path, name: str) -> None:
     mesh = read_asset(written(tmp_path, name, RIGHT[name])).mesh
     assert len(mesh.points) == 8 and len(mesh.faces) == 12
     assert volume(mesh) == pytest.approx(8.0)
+
+
+def test_faces_at_no_place_are_left_out_and_counted(tmp_path: Path) -> None:
+    asset = read_asset(written(tmp_path, "m.obj", V + "v nan 0 0\nf 1 2 9\n" + F + "f 9 9 9\n"))
+    assert any(note.startswith("2 faces with corners that are not finite") for note in asset.notes)
+    assert asset.source_faces is not None and sorted(set(asset.source_faces.tolist())) == list(range(1, 7))
+
+
+# Packages of printers
+
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+SHAPE = (
+    "<mesh><vertices>"
+    + "".join(f'<vertex x="{x:g}" y="{y:g}" z="{z:g}"/>' for x, y, z in CORNERS)
+    + "</vertices><triangles>"
+    + "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in TRIANGLES.tolist())
+    + "</triangles></mesh>"
+)
+CUBE = f'<object id="1">{SHAPE}</object>'
+
+
+def package(folder: Path, objects: str, items: str, **others: str) -> Path:
+    """A 3MF package; others: further parts of its folder 3D by name."""
+
+    def model(inside: str, build: str) -> str:
+        spaces = f'xmlns="{CORE}" xmlns:p="{PRODUCTION}"'
+        return f'<model unit="meter" {spaces}><resources>{inside}</resources><build>{build}</build></model>'
+
+    with zipfile.ZipFile(folder / "m.3mf", "w") as made:
+        for name, inside in others.items():
+            made.writestr(f"3D/Objects/{name}.model", model(inside, ""))
+        made.writestr("3D/3dmodel.model", model(objects, items))
+    return folder / "m.3mf"
+
+
+OTHER = 'p:path="/3D/Objects/other.model" objectid="1"'
+
+
+@pytest.mark.parametrize(
+    ("objects", "items", "noted"),
+    [
+        (f'<object id="2"><components><component {OTHER}/></components></object>', '<item objectid="2"/>', ""),
+        ("", f"<item {OTHER}/>", ""),
+        (CUBE, "", "to be built"),
+        (CUBE.replace('id="1"', 'id="1" type="surface"'), '<item objectid="1"/>', ""),
+        (
+            CUBE + CUBE.replace('id="1"', 'id="2" type="support"'),
+            '<item objectid="1"/><item objectid="2"/>',
+            ": 2.",
+        ),
+        (CUBE, '<item objectid="1"/><item objectid="7"/>', ": 7."),
+        (CUBE + CUBE.replace('id="1"', 'id="2" name="UCX_a"'), '<item objectid="1"/><item objectid="2"/>', "UCX_a"),
+    ],
+)
+def test_packages_as_printers_write_them(tmp_path: Path, objects: str, items: str, noted: str) -> None:
+    asset = read_asset(package(tmp_path, objects, items, other=CUBE))
+    assert volume(asset.mesh) == pytest.approx(8.0) and len(asset.mesh.faces) == 12
+    assert bool(asset.notes) == bool(noted) and noted in " ".join(asset.notes)
+
+
+def test_components_in_a_ring_of_parts_are_refused(tmp_path: Path) -> None:
+    ring = f'<object id="1"><components><component {OTHER}/></components></object>'
+    with pytest.raises(FileRefused, match="ring"):
+        read_asset(package(tmp_path, ring, '<item objectid="1"/>', other=ring))
 
 
 @pytest.mark.parametrize("lines", ["o UCX_cube", "o Hull\ng cube_collider", "g Cube_LOD1"])
@@ -153,6 +224,34 @@ def test_copies_of_a_mesh_are_all_there(tmp_path: Path, keys: dict[str, int], si
     assert volume(asset.mesh) == pytest.approx(size) and len(asset.mesh.faces) == 36
     assert asset.mesh.points.max(axis=0)[:2] == pytest.approx((10.0, 20.0), abs=2.1)
     assert any(name in note for note in asset.notes)
+
+
+def test_what_is_null_is_left_out(tmp_path: Path) -> None:
+    def change(document: dict[str, Any]) -> None:
+        document["nodes"][0] |= {"name": None, "translation": None, "matrix": None, "extensions": None}
+        document["skins"] = None
+
+    assert volume(read_asset(gltf(tmp_path, change)).mesh) == pytest.approx(8.0)
+
+
+def test_folders_may_be_parted_as_on_windows(tmp_path: Path) -> None:
+    path = gltf(tmp_path, lambda document: document["buffers"][0].update(uri="data\\my%20cube.bin"))
+    (tmp_path / "data").mkdir()
+    (tmp_path / "my cube.bin").rename(tmp_path / "data" / "my cube.bin")
+    assert volume(read_asset(path).mesh) == pytest.approx(8.0)
+
+
+def test_coarser_levels_of_msft_lod_are_no_surface(tmp_path: Path) -> None:
+    def change(document: dict[str, Any]) -> None:
+        document["nodes"] = [
+            {"mesh": 0, "extensions": {"MSFT_lod": {"ids": [1]}}},
+            {"children": [2]},
+            {"mesh": 0, "name": "coarse", "scale": [3, 3, 3]},
+        ]
+        document["scenes"] = [{"nodes": [0, 1]}]
+
+    asset = read_asset(gltf(tmp_path, change))
+    assert volume(asset.mesh) == pytest.approx(8.0) and any("coarse" in note for note in asset.notes)
 
 
 @pytest.mark.parametrize("attributes", [{}, {"TRANSLATION": 2, "SCALE": 0}, {"_ID": 2}, {"TRANSLATION": 99}])

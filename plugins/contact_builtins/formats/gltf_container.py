@@ -184,7 +184,7 @@ def open_gltf(path: Path) -> Gltf:
     else:
         text, binary = data, b""
     try:
-        document = json.loads(text.decode("utf-8-sig"))
+        document = _without_nulls(json.loads(text.decode("utf-8-sig")))
     except ValueError as error:
         raise InvalidInput("it is neither a GLB container nor JSON text") from error
     if isinstance(document, dict) and any(isinstance(document.get(key), dict) for key in ("meshes", "nodes")):
@@ -203,6 +203,15 @@ def open_gltf(path: Path) -> Gltf:
                 f"{path} requires the glTF extension {name}, which is not read here. Export without it."
             )
     return Gltf(document, binary, path)
+
+
+def _without_nulls(value: Any) -> Any:
+    """The document without members that are null: some exporters write so what the format leaves out."""
+    if isinstance(value, dict):
+        return {key: _without_nulls(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, list) and value and isinstance(value[0], (dict, list)):
+        return [_without_nulls(inner) for inner in value]
+    return value
 
 
 def bounded_offset(value: Any) -> int:
@@ -238,6 +247,8 @@ def _beside(path: Path, uri: str) -> Path:
     """The path of an external buffer, which must lie in the file's own folder or below it."""
     folder = path.resolve().parent
     wanted = (folder / unquote(uri)).resolve()
+    if not wanted.is_file() and "\\" in uri:  # written on Windows, where that parts folders
+        wanted = (folder / unquote(uri).replace("\\", "/")).resolve()
     if "://" in uri or not wanted.is_relative_to(folder):
         raise FileRefused(
             f"{path} wants its buffer from {uri[:200]!r}, outside its folder; only files below it are read."

@@ -58,8 +58,13 @@ def read_nodes(gltf: Gltf) -> Nodes:
 def _hidden(
     entries: list[dict[str, Any]], order: tuple[int, ...], parents: IntArray, world: FloatArray
 ) -> frozenset[int]:
-    """Nodes switched off by KHR_node_visibility, with all below them, and nodes scaled to nothing."""
-    hidden = set[int]()
+    """Nodes switched off by KHR_node_visibility and coarser levels of another (MSFT_lod), with all below them, and
+    nodes scaled to nothing."""
+    hidden = {
+        int(coarser)
+        for entry in entries
+        for coarser in ((entry.get("extensions") or {}).get("MSFT_lod") or {}).get("ids", ())
+    }
     for index in order:
         said = (entries[index].get("extensions") or {}).get("KHR_node_visibility") or {}
         off = said.get("visible", True) is False

@@ -122,14 +122,17 @@ def _header(data: bytes) -> tuple[str, list[Element], bytes]:
 
 
 def _declare(words: list[str], elements: list[Element]) -> None:
-    """Take a line of the header in. Raises InvalidInput; LookupError where words are missing or unknown."""
+    """Take a line of the header in; names count in either case.
+
+    Raises InvalidInput; LookupError where words are missing or unknown.
+    """
     if words[:1] == ["element"]:
         count = whole(words[2].encode(), f"the count of {words[1]}")
-        elements.append(Element(words[1], bounded(count, f"rows of {words[1]}")))
+        elements.append(Element(words[1].lower(), bounded(count, f"rows of {words[1]}")))
     elif words[:2] == ["property", "list"]:
-        elements[-1].properties.append(Property(words[4], TYPES[words[3]], TYPES[words[2]]))
+        elements[-1].properties.append(Property(words[4].lower(), TYPES[words[3]], TYPES[words[2]]))
     elif words[:1] == ["property"]:
-        elements[-1].properties.append(Property(words[2], TYPES[words[1]]))
+        elements[-1].properties.append(Property(words[2].lower(), TYPES[words[1]]))
 
 
 def _table(body: bytes, element: Element, at: int, order: str) -> tuple[Table, int]:

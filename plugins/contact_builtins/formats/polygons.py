@@ -54,11 +54,8 @@ def surface_of(polygons: Polygons, weld_groups: IntArray | None = None) -> Surfa
     if polygons.kept is not None:
         numbers = numbers[polygons.kept]
         sizes, indices = sizes[numbers], indices[np.repeat(polygons.kept, sizes)]
+    sizes, indices, numbers, odd = _finite(points, sizes, indices, numbers)
     used, corners = np.unique(indices, return_inverse=True)
-    finite = np.isfinite(points[used]).all(axis=1)
-    if not finite.all():
-        bad = int(used[np.argmin(finite)])
-        raise InvalidInput(f"vertex {bad} is at {points[bad].tolist()}, which is not finite, and a face uses it")
     apart = None if weld_groups is None else weld_groups[used]
     sound = sound_polygons(points[used], sizes, corners.reshape(-1), apart=apart)
     triangles, cut, notes = triangulate(sound.sizes, sound.indices, points[used[sound.first]])
@@ -76,8 +73,25 @@ def surface_of(polygons: Polygons, weld_groups: IntArray | None = None) -> Surfa
         source_vertices=source_vertices,
         first_source=first_source,
         source_faces=numbers[sound.face_of[cut]],
-        notes=(*_unused_notes(len(points) - len(used)), *sound.notes, *notes),
+        notes=(*odd, *_unused_notes(len(points) - len(used)), *sound.notes, *notes),
     )
+
+
+def _finite(
+    points: FloatArray, sizes: IntArray, indices: IntArray, numbers: IntArray
+) -> tuple[IntArray, IntArray, IntArray, list[str]]:
+    """Polygons without those that have a corner at no place, and a note. Raises InvalidInput where none is left."""
+    finite = np.asarray(np.isfinite(points[indices]).all(axis=1))
+    if finite.all():
+        return sizes, indices, numbers, []
+    polygon = np.repeat(np.arange(len(sizes)), sizes)
+    sound = np.ones(len(sizes), bool)
+    sound[polygon[~finite]] = False
+    if not sound.any():
+        bad = int(indices[np.argmin(finite)])
+        raise InvalidInput(f"vertex {bad} is at {points[bad].tolist()}, which is not finite, and a face uses it")
+    note = f"{np.count_nonzero(~sound)} faces with corners that are not finite were left out."
+    return sizes[sound], indices[sound[polygon]], numbers[sound], [note]
 
 
 def _unused_notes(unused: int) -> list[str]:
