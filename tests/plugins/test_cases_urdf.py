@@ -15,6 +15,7 @@ from contact_core.errors import FileRefused
 from contact_core.geometry import solids
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.report import report
+from contact_core.plugins.reading import read_asset
 from contact_core.plugins.slots import Format
 from contact_core.testing import meshes
 from contact_core.testing.format_contract import FormatContract
@@ -230,7 +231,8 @@ def test_solids_are_closed_and_turned_outwards(solid: solids.Solid) -> None:
         (f'<link name="a">{BOX.replace("0.2 0.2", "${w} 0.2")}</link>', "expand it with xacro first"),
         (f'<link name="$(arg prefix)a">{BOX}</link>', "expand it with xacro first"),
         (f'<link name="a">{BOX.replace("0.2 0.2", "wide 0.2")}</link>', "3 numbers must stand"),
-        (two('<joint name="j" type="hinge">'), "a URDF joint is one of"),
+        (two('<joint name="j" type="revolute"><limit lower="-1,5" upper="1,5"/>'), "-1,5"),
+        (two('<joint name="j" type="fixed"><origin xyz="0 0"/>'), "3 numbers must stand"),
         (f'<link name="a">{BOX}</link>' * 2, "two links named 'a'"),
         (two('<joint name="j" type="fixed">').replace('child link="c"', 'child link="d"'), "'d', which is not"),
         (mesh_visual("https://host/m.obj"), "no addresses"),
@@ -287,6 +289,83 @@ def test_a_default_namespace_is_read_over(tmp_path: Path, space: str) -> None:
 def test_limits_that_look_like_degrees_are_noted(tmp_path: Path, limit: float, noted: bool) -> None:
     joint = f'<joint name="j" type="revolute"><limit lower="-{limit}" upper="{limit}"/>'
     assert any("degrees" in note for note in read(tmp_path / "r.urdf", two(joint)).notes) is noted
+
+
+@pytest.mark.parametrize(
+    ("joint", "kind", "noted"),
+    [
+        ('type="revolute"><axis xyz="0 0 0"/><limit lower="-1" upper="1"/>', "fixed", "no length"),
+        ('type="Revolute"><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>', "hinge", ""),
+        ('type="ball">', "fixed", "held still"),
+        ('type="revolute"><limit lower="1" upper="-1"/>', "hinge", "exchanged"),
+        ('type="revolute"><limit lower="nan" upper="1"/>', "hinge", "no number"),
+        ('type="revolute"><limit lower="-inf" upper="inf"/>', "hinge", ""),
+        ('type="revolute"><axis xyz="0, 0, 1"/><limit lower="-1" upper="1"/>', "hinge", ""),
+        ('type="revolute"><axis xyz=""/><origin xyz="" rpy=" "/><limit lower="-1" upper="1"/>', "hinge", ""),
+        ('type="revolute"><limit lower="-1" upper="1"/><mimic joint="ghost"/>', "hinge", "mimic"),
+    ],
+)
+def test_one_odd_value_of_a_joint_spoils_no_robot(tmp_path: Path, joint: str, kind: str, noted: str) -> None:
+    asset = read(tmp_path / "r.urdf", two(f'<joint name="j" {joint}'))
+    assert asset.rig is not None and asset.rig.freedoms[1].kind == kind and len(asset.mesh.faces) == 24
+    assert bool(asset.notes) == bool(noted) and noted in " ".join(asset.notes)
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    ['<sphere radius="-1"/>', "<mesh/>", '<mesh filename="a.obj" scale="0 0 0"/>', '<box size="1 a 1"/>'],
+)
+def test_one_odd_shape_is_named_and_spoils_no_robot(tmp_path: Path, geometry: str) -> None:
+    odd = f"<visual><geometry>{geometry}</geometry></visual>"
+    asset = read(tmp_path / "r.urdf", f'<link name="a">{odd}{BOX}</link>')
+    assert len(asset.mesh.faces) == 12 and any("link 'a'" in note for note in asset.notes)
+    with pytest.raises(FileRefused, match="link 'a'"):
+        read(tmp_path / "s.urdf", f'<link name="a">{odd}</link>')
+
+
+def test_the_largest_of_several_trees_is_the_robot(tmp_path: Path) -> None:
+    arm = two('<joint name="j" type="fixed">')
+    asset = read(tmp_path / "r.urdf", f'<link name="alone">{BOX}</link>{arm}<link name="also"/>')
+    assert asset.rig is not None and asset.rig.joints == ("p", "j") and len(asset.mesh.faces) == 24
+    assert any("alone, also" in note for note in asset.notes)
+    ring = arm.replace('name="p"', 'name="q"').replace('"c"', '"d"').replace('"j"', '"k"').replace('"p"', '"d"')
+    with pytest.raises(FileRefused, match="ring"):
+        read(tmp_path / "s.urdf", arm + ring)
+
+
+def test_what_stands_before_the_declaration_is_passed_over(tmp_path: Path) -> None:
+    (tmp_path / "r.urdf").write_text(f'\n  <?xml version="1.0"?><robot><link name="a">{BOX}</link></robot>')
+    assert len(UrdfFiles().read(tmp_path / "r.urdf").mesh.faces) == 12
+
+
+@pytest.mark.parametrize(
+    "name", ["meshes/a.obj", "Meshes/A.obj", "package://ARM/meshes/A.OBJ", "package://arm/meshes/a.obj"]
+)
+def test_names_of_meshes_count_in_either_case_where_one_file_is_meant(tmp_path: Path, name: str) -> None:
+    meshes_ = tmp_path / "arm" / "meshes"
+    meshes_.mkdir(parents=True)
+    (meshes_ / "A.OBJ").write_text(OBJ)
+    where = tmp_path / "arm" / ("urdf" if name.startswith("package://arm") else "")
+    assert len(read(where / "r.urdf", mesh_visual(name)).mesh.faces) == 4
+    (meshes_ / "a.Obj").write_text(OBJ)  # another: now either may be meant
+    if name.endswith("a.obj"):
+        with pytest.raises(FileRefused, match="no such file"):
+            read(where / "r.urdf", mesh_visual(name))
+
+
+def test_a_link_out_of_the_folder_is_not_followed_in_another_case(tmp_path: Path) -> None:
+    (tmp_path / "r").mkdir()
+    (tmp_path / "secret.obj").write_text(OBJ)
+    (tmp_path / "r" / "A.obj").symlink_to(tmp_path / "secret.obj")
+    with pytest.raises(FileRefused, match=r"a\.obj"):
+        read(tmp_path / "r" / "r.urdf", mesh_visual("a.obj"))
+
+
+@pytest.mark.parametrize("name", ["m.obj", "m.stl", "m.glb", "r.urdf", "m.3mf", "m.ply", "m.dae"])
+def test_a_pointer_of_git_lfs_is_called_that(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+    with pytest.raises(FileRefused, match="git lfs pull"):
+        read_asset(tmp_path / name)
 
 
 def chain(count: int) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused, InvalidInput, MissingExtra
 from contact_core.geometry.mesh import TriangleMesh
@@ -139,9 +140,22 @@ def _host(
 
 
 def _one_mesh(host: UsdHost, path: Path, ids: list[str]) -> Asset:
-    """All surfaces where they stand, one below the other; the maps go to the stage's own points and faces."""
-    parts = [host.read_surface(key) for key in ids]
-    places = [host.placement(key) for key in ids]
+    """All surfaces where they stand, one below the other; the maps go to the stage's own points and faces.
+
+    A mesh that cannot be read is left out with a note. Raises InvalidInput where none can.
+    """
+    parts, places, odd = list[Asset](), list[FloatArray](), list[str]()
+    for key in tuple(ids):
+        try:
+            part, place = host.read_surface(key), host.placement(key)
+        except InvalidInput as error:
+            if key == ids[-1] and not parts:
+                raise
+            odd.append(str(error).rstrip("."))
+            ids = [other for other in ids if other != key]
+            continue
+        parts.append(part)
+        places.append(place)
     placed = [transform_points(m, p.mesh.points) for p, m in zip(parts, places, strict=True)]
     starts = np.cumsum([0, *(len(points) for points in placed)])[:-1]
     space = host.space()
@@ -158,6 +172,7 @@ def _one_mesh(host: UsdHost, path: Path, ids: list[str]) -> Asset:
         up_axis=space.up_axis,
         notes=(
             *space.notes,
+            *([f"meshes that cannot be read were left out: {'; '.join(odd[:4])}."] if odd else ()),
             *(f"{key}: {note}" for key, part in zip(ids, parts, strict=True) for note in part.notes),
         ),
         details={"format": "usd", "prims": ids},

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Tf, Usd, UsdGeom
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.polar import PolarDecomposition, split_world_from_local
@@ -120,9 +120,26 @@ def read_arrays(prim: Usd.Prim) -> MeshArrays:
     kept[holes[(holes >= 0) & (holes < len(sizes))]] = False
     if not kept.all():
         notes.append(f"{np.count_nonzero(~kept)} faces are holes and were left out.")
-        indices, sizes = indices[np.repeat(kept, sizes)], sizes[kept]
+    points, sound = _finite(points, sizes, indices)
+    if not sound[kept].all():
+        notes.append(f"{np.count_nonzero(~sound & kept)} faces with corners that are not finite were left out.")
+    kept &= sound
+    if not kept.any():
+        raise InvalidInput(f"{prim.GetPath()} has no face whose points are finite.")
+    indices, sizes = indices[np.repeat(kept, sizes)], sizes[kept]
     left_handed = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
     return MeshArrays(points, sizes, indices, np.flatnonzero(kept), left_handed, tuple(notes))
+
+
+def _finite(points: FloatArray, sizes: IntArray, indices: IntArray) -> tuple[FloatArray, BoolArray]:
+    """Points (n, 3), those that are not finite put on another, and the faces (f,) that have none of them."""
+    finite = np.asarray(np.isfinite(points).all(axis=1))
+    sound = np.ones(len(sizes), bool)
+    if finite.all() or not finite.any():
+        sound[:] = finite.all()
+        return points, sound
+    sound[np.repeat(np.arange(len(sizes)), sizes)[~finite[indices]]] = False
+    return np.where(finite[:, None], points, points[int(np.argmax(finite))]), sound
 
 
 def read_surface(prim: Usd.Prim, space: SceneSpace) -> Asset:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contact_builtins.formats import gltf_meshopt
-from contact_builtins.formats.refusal import bounded, file_bytes
+from contact_builtins.formats.refusal import bounded, file_bytes, file_of
 from contact_core.errors import FileRefused, InvalidInput
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
@@ -249,6 +249,7 @@ def _beside(path: Path, uri: str) -> Path:
     wanted = (folder / unquote(uri)).resolve()
     if not wanted.is_file() and "\\" in uri:  # written on Windows, where that parts folders
         wanted = (folder / unquote(uri).replace("\\", "/")).resolve()
+    wanted = file_of(wanted, folder)
     if "://" in uri or not wanted.is_relative_to(folder):
         raise FileRefused(
             f"{path} wants its buffer from {uri[:200]!r}, outside its folder; only files below it are read."

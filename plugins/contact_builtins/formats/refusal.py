@@ -12,6 +12,7 @@ from contact_core.errors import FileRefused, InvalidInput
 
 _TOLD = 8  # names in a sentence
 NO_FACES = "holds no faces, so there is nothing to touch; name a file with a mesh."
+_POINTER = b"version https://git-lfs.github.com/spec/"  # what a clone without LFS has in the place of a large file
 MAX_FILE_BYTES = 1 << 30
 MAX_JOINTS = 4096
 MAX_ELEMENTS = 20_000_000  # vertices, faces, accessor rows: far above any mesh that a person paints on
@@ -80,11 +81,39 @@ def file_bytes(path: Path) -> bytes:
             raise FileRefused(f"{path} is not a file; give the path of a mesh or rig file.")
         if size > MAX_FILE_BYTES:
             raise FileRefused(f"{path} has {size} bytes; files up to {MAX_FILE_BYTES} bytes are read. Split it.")
-        return path.read_bytes()
+        data = path.read_bytes()
     except OSError as error:
         raise FileRefused(f"{path} cannot be read: {error.strerror or error}.") from error
     except ValueError as error:  # a zero byte, or half of a surrogate pair
         raise FileRefused(f"{str(path)!r} cannot be the name of a file.") from error
+    if data.startswith(_POINTER):
+        raise FileRefused(
+            f"{path} is a pointer of Git LFS and not the file itself: fetch it (git lfs pull) and try again."
+        )
+    return data
+
+
+def file_of(wanted: Path, below: Path) -> Path:
+    """A file by its name, in whatever case it is written below a folder: Windows does not tell them apart."""
+    if wanted.is_file() or not wanted.is_relative_to(below):
+        return wanted
+    found = below
+    for part in wanted.relative_to(below).parts:
+        there = found / part
+        if not there.exists():
+            alike = [child for child in _children(found) if child.name.casefold() == part.casefold()]
+            if len(alike) != 1:
+                return wanted
+            there = alike[0]
+        found = there
+    return found.resolve()
+
+
+def _children(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError:
+        return []
 
 
 def bounded(count: int, what: str, most: int = MAX_ELEMENTS) -> int:

@@ -48,7 +48,8 @@ class UrdfFiles:
             told = sidecar or sidecar_beside(path)
             links, joints = parse_urdf(path)
             bounded(len(joints), "joints", MAX_JOINTS)
-            joints = _parents_first(links, joints)
+            links, joints, apart = _parents_first(links, joints)
+            joints, strangers = _without_strangers(joints)
             rig, source_faces, notes = _rig(MeshPaths(path, self._roots), links, joints)
             hands: list[dict[str, Any]] = []
             if told is not None:
@@ -69,7 +70,7 @@ class UrdfFiles:
             source_faces=source_faces,
             meters_per_unit=rig.meters_per_unit,
             up_axis=rig.up_axis,
-            notes=(*_joint_notes(joints), *notes),
+            notes=(*apart, *strangers, *_joint_notes(joints), *notes),
             details={"format": "urdf", "influences": 1, "weights_sum_to_1": True, "mimic": mimic, "hands": hands},
         )
 
@@ -78,8 +79,13 @@ class UrdfFiles:
         raise FileRefused(f"{path}: URDF is only read here; write a .glb file instead.")
 
 
-def _parents_first(links: tuple[Link, ...], joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
-    """The joints level by level from the base link. Raises InvalidInput where they are no tree."""
+def _parents_first(
+    links: tuple[Link, ...], joints: tuple[Joint, ...]
+) -> tuple[tuple[Link, ...], tuple[Joint, ...], list[str]]:
+    """The links and joints of the largest tree, joints level by level from its base link, and notes.
+
+    Raises InvalidInput where they are no trees.
+    """
     below: dict[str, list[Joint]] = defaultdict(list)
     names = {link.name for link in links}
     children = set[str]()
@@ -91,37 +97,52 @@ def _parents_first(links: tuple[Link, ...], joints: tuple[Joint, ...]) -> tuple[
             raise InvalidInput(f"link {joint.child!r} is the child of two joints")
         children.add(joint.child)
         below[joint.parent].append(joint)
-    bases = [link.name for link in links if link.name not in children]
-    if len(bases) != 1:
-        raise InvalidInput(f"it has {len(bases)} base links ({', '.join(bases[:4])}); a rig has one")
-    order = list(below[bases[0]])
-    for joint in order:  # grows while it is walked
-        order += below[joint.child]
-    if len(order) != len(joints):
-        reached = {joint.name for joint in order}
+    trees = {link.name: list(below[link.name]) for link in links if link.name not in children}
+    if not trees:
+        raise InvalidInput("it has no base link, one that is the child of no joint")
+    for order in trees.values():
+        for joint in order:  # grows while it is walked
+            order += below[joint.child]
+    if sum(map(len, trees.values())) != len(joints):
+        reached = {joint.name for order in trees.values() for joint in order}
         lost = next(joint.name for joint in joints if joint.name not in reached)
-        raise InvalidInput(f"joint {lost!r} is not connected to the base link {bases[0]!r}")
-    return tuple(order)
+        raise InvalidInput(f"joint {lost!r} is part of a ring, and connected to no base link")
+    base = max(trees, key=lambda name: len(trees[name]))
+    kept = {base, *(joint.child for joint in trees[base])}
+    others = [link.name for link in links if link.name not in kept]
+    told = (
+        [f"Links that no joint connects with {base}, its base, were left out: {named(others)}."] if others else []
+    )
+    return tuple(link for link in links if link.name in kept), tuple(trees[base]), told
+
+
+def _without_strangers(joints: tuple[Joint, ...]) -> tuple[tuple[Joint, ...], list[str]]:
+    """The joints, of which those that mimic one that is not there mimic none, and a note."""
+    names = {joint.name for joint in joints}
+    odd = [joint.name for joint in joints if joint.mimic is not None and joint.mimic.joint not in names]
+    told = (
+        [f"What they are to mimic is not there, so these joints move by themselves: {named(odd)}."] if odd else []
+    )
+    return tuple(replace(j, mimic=None) if j.name in set(odd) else j for j in joints), told
 
 
 def _joint_notes(joints: tuple[Joint, ...]) -> list[str]:
     notes = []
-    held = [joint.name for joint in joints if joint.kind in ("prismatic", "floating", "planar")]
+    held = [joint.name for joint in joints if joint.kind not in ("revolute", "continuous", "fixed")]
     if held:
         notes.append(f"Joints of a kind that is not posed here are held still: {named(held)}.")
     coupled = [joint.name for joint in joints if joint.mimic is not None and joint.turns]
     if coupled:
         notes.append(f"Coupled (mimic) joints turn with the joints that they mimic: {named(coupled)}.")
-    unsaid = [joint.name for joint in joints if joint.unsaid]
-    if unsaid:
-        notes.append(
-            f"The limits of {named(unsaid)} leave out lower or upper; the URDF specification takes 0 for it."
-        )
-    degrees = [joint.name for joint in joints if joint.limits and max(map(abs, joint.limits)) > _TURNS]
+    for odd in dict.fromkeys(odd for joint in joints for odd in joint.odd):
+        whose = [joint.name for joint in joints if odd in joint.odd]
+        notes.append(f"{odd[0].upper()}{odd[1:]}: {named(whose)}.")
+    degrees = [joint for joint in joints if _TURNS < _largest(joint) < np.inf]
     if degrees:
         notes.append(
-            f"The limits of {named(degrees)} are far beyond a turn ({_largest(joints):g}), as if they were degrees;"
-            " URDF takes them for radians, and so they were read."
+            f"The limits of {named([joint.name for joint in degrees])} are beyond a turn"
+            f" ({max(map(_largest, degrees)):g}), as if they were degrees; URDF takes them for radians, and so they"
+            " were read."
         )
     free = [joint.name for joint in joints if joint.kind == "revolute" and joint.limits is None]
     if free:
@@ -129,8 +150,8 @@ def _joint_notes(joints: tuple[Joint, ...]) -> list[str]:
     return notes
 
 
-def _largest(joints: tuple[Joint, ...]) -> float:
-    return max(abs(limit) for joint in joints for limit in joint.limits or ())
+def _largest(joint: Joint) -> float:
+    return max((abs(limit) for limit in joint.limits or () if np.isfinite(limit)), default=0.0)
 
 
 def _rig(paths: MeshPaths, links: tuple[Link, ...], joints: tuple[Joint, ...]) -> tuple[Rig, IntArray, list[str]]:
@@ -191,6 +212,8 @@ def _skin(
     if not points:
         if reading.refused is not None:
             raise reading.refused
+        if reading.odd:
+            raise InvalidInput(reading.odd[0])
         raise NoSurface(
             "gives none of its links a <visual> with a shape, so there is nothing to touch with; add some."
         )
@@ -210,11 +233,13 @@ class _Reading:
     missing: dict[str, list[str]] = field(default_factory=dict)
     replaced: list[str] = field(default_factory=list)
     unseen: list[str] = field(default_factory=list)
+    odd: list[str] = field(default_factory=list)
     refused: FileRefused | MissingExtra | None = None
 
     def shapes_of(self, link: Link, hulls: bool) -> list[tuple[Visual, solids.Solid]]:
         """What is drawn of a link; its collision shapes where nothing of that can be read, or `hulls` asks for
         them."""
+        self.odd += link.odd
         if hulls:
             return self._read(link, link.collisions)
         found = self._read(link, link.visuals)
@@ -242,6 +267,8 @@ class _Reading:
             told.append(f"Meshes that could not be read were left out: {named(names)}. {self.refused}")
         if self.replaced:
             told.append(f"In place of such meshes stand the <collision> shapes of {named(self.replaced)}.")
+        if self.odd:
+            told.append(f"Shapes that are none were left out: {named(self.odd)}.")
         return [*told, *self.notes]
 
     def _read(self, link: Link, visuals: Sequence[Visual]) -> list[tuple[Visual, solids.Solid]]:
@@ -297,14 +324,12 @@ def _solid(
 def _followers(joints: tuple[Joint, ...]) -> dict[str, Mimic]:
     """By name of each coupled hinge what it turns with in the end: a hinge that mimics none, multiplier and offset.
 
-    Raises InvalidInput where that is not there, or goes in a circle.
+    Raises InvalidInput where that goes in a circle.
     """
     by_name, result = {joint.name: joint for joint in joints}, dict[str, Mimic]()
     for joint in joints:
         rule, seen = joint.mimic, {joint.name}
         while rule is not None:
-            if rule.joint not in by_name:
-                raise InvalidInput(f"joint {joint.name!r} mimics {rule.joint!r}, which is not there")
             if rule.joint in seen:
                 raise InvalidInput(f"joint {joint.name!r} mimics itself by way of {', '.join(sorted(seen))}")
             seen.add(rule.joint)

@@ -1,8 +1,9 @@
 """Where the mesh files of a URDF lie: beside it, in its ROS package, or in a package under a root that was given.
 
 A file that somebody sent may name any path. It is read only below the URDF's own folder, below the package that
-the URDF lies in (the nearest folder above it with a `package.xml`), and in packages below roots that the user
-names, by `UrdfFiles(package_roots=...)` or in ROS_PACKAGE_PATH, as ROS itself has it.
+the URDF lies in (the nearest folder above it with a `package.xml`, else one of the two above it that has the
+package's name), and in packages below roots that the user names, by `UrdfFiles(package_roots=...)` or in
+ROS_PACKAGE_PATH, as ROS itself has it.
 """
 
 from __future__ import annotations
@@ -15,9 +16,12 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
+from contact_builtins.formats.refusal import file_of
 from contact_core.errors import FileRefused
 
 _SCHEMES = ("package://", "model://")
+_ABOVE = 2  # folders above a URDF's own, of which one may be its package: package/urdf/arm/arm.urdf
+_OUTERMOST = 2  # parts of a path that is no package: /home holds what is nobody's business
 _DEPTH = 4  # folders below a root in which packages are sought: a workspace's src/group/package at most
 
 
@@ -54,6 +58,9 @@ class MeshPaths:
                 wanted = _resolved(base / spelled)
                 if wanted is None or not any(wanted.is_relative_to(b) for b in (bound, *self._given)):
                     continue
+                wanted = file_of(wanted, bound)
+                if not any(wanted.is_relative_to(b) for b in (bound, *self._given)):
+                    continue  # another case led by a link out of it
                 inside = True
                 if wanted.is_file():
                     return wanted
@@ -84,7 +91,10 @@ class MeshPaths:
             found.append((self.package, self.package))
         for root in self._given:
             found += [(folder, root) for folder in _below(root) if _is_package(folder, package)]
-        # without a package.xml the URDF's own folder stands for its package
+        if self.package is None:  # a copy without its package.xml: the folder above that is called so
+            above = [folder for folder in self.folder.parents[:_ABOVE] if len(folder.parts) > _OUTERMOST]
+            found += [(folder, folder) for folder in above if folder.name == package]
+        # without that the URDF's own folder stands for its package
         return [*found, (self.folder, self.package or self.folder)]
 
 

@@ -17,7 +17,7 @@ from contact_builtins.formats.refusal import file_bytes
 from contact_core.arrays import FloatArray
 from contact_core.errors import FileRefused, InvalidInput
 
-JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+UNSAID = "a limit without lower or upper, which the URDF specification takes for 0"
 _MACRO = re.compile(r"\$[{(]")
 
 
@@ -37,11 +37,12 @@ class Visual:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """visuals: what is drawn. collisions: what physics meets instead."""
+    """visuals: what is drawn. collisions: what physics meets instead. odd: why other visuals are no shape."""
 
     name: str
     visuals: tuple[Visual, ...]
     collisions: tuple[Visual, ...] = ()
+    odd: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Mimic:
 @dataclass(frozen=True, eq=False)
 class Joint:
     """origin: (4, 4) parent_from_joint at angle zero. axis: (3,) as written. limits: (lower, upper) or None where
-    no limit is given; what a `<limit>` leaves out is 0 by the specification, and listed in `unsaid`."""
+    no limit is given. odd: what is not as the specification has it, and what was made of it."""
 
     name: str
     kind: str
@@ -63,7 +64,7 @@ class Joint:
     origin: FloatArray
     axis: FloatArray
     limits: tuple[float, float] | None
-    unsaid: tuple[str, ...]
+    odd: tuple[str, ...]
     mimic: Mimic | None
 
     @property
@@ -74,7 +75,7 @@ class Joint:
 
 def parse_urdf(path: Path) -> tuple[tuple[Link, ...], tuple[Joint, ...]]:
     """The links and joints of a file. Raises FileRefused, InvalidInput."""
-    text = file_bytes(path)
+    text = file_bytes(path).lstrip()  # XML must begin with its declaration, which people do not see
     if b"<!DOCTYPE" in text or b"<!ENTITY" in text:  # no entities: they name other files
         raise FileRefused(f"{path} declares a document type, which no URDF needs and which is not read. Remove it.")
     try:
@@ -117,14 +118,19 @@ def _check_expanded(path: Path, root: ElementTree.Element) -> None:
 
 def _link(entry: ElementTree.Element) -> Link:
     name = _named(entry, "link")
-    visuals = [shape for item in entry.findall("visual") for shape in _shapes(item, f"a visual of link {name!r}")]
-    try:
-        hulls = [
-            shape for item in entry.findall("collision") for shape in _shapes(item, f"a collision of link {name!r}")
-        ]
-    except InvalidInput:  # mostly used by nobody here, so a damaged one costs nothing
-        hulls = []
-    return Link(name, tuple(visuals), tuple(hulls))
+    visuals, odd = _shapes_of(entry, "visual", name)
+    return Link(name, visuals, _shapes_of(entry, "collision", name)[0], odd)
+
+
+def _shapes_of(entry: ElementTree.Element, kind: str, name: str) -> tuple[tuple[Visual, ...], tuple[str, ...]]:
+    """The shapes of a link, drawn or for collisions, and why others are none: one odd shape spoils no robot."""
+    found, odd = list[Visual](), list[str]()
+    for item in entry.findall(kind):
+        try:
+            found += _shapes(item, f"a {kind} of link {name!r}")
+        except InvalidInput as error:
+            odd.append(str(error))
+    return tuple(found), tuple(odd)
 
 
 def _shapes(entry: ElementTree.Element, whose: str) -> Iterator[Visual]:
@@ -153,7 +159,7 @@ def _sizes(values: FloatArray | list[float], whose: str) -> tuple[float, ...]:
 
 def _scale(shape: ElementTree.Element, whose: str) -> tuple[float, ...]:
     """Three factors; a single number is meant for all axes."""
-    words = (shape.get("scale") or "1 1 1").split()
+    words = (shape.get("scale") or "1 1 1").replace(",", " ").split()
     scale = _floats(words * 3 if len(words) == 1 else words, "scale", 3, whose)
     if (scale == 0).any():
         raise InvalidInput(f"{whose} has the scale {' '.join(words)}, which flattens it")
@@ -163,22 +169,21 @@ def _scale(shape: ElementTree.Element, whose: str) -> tuple[float, ...]:
 def _joint(entry: ElementTree.Element) -> Joint:
     name = _named(entry, "joint")
     whose = f"joint {name!r}"
-    kind = entry.get("type") or ""
-    if kind not in JOINT_TYPES:
-        raise InvalidInput(f"{whose} has the type {kind!r}; a URDF joint is one of {', '.join(JOINT_TYPES)}")
+    kind = (entry.get("type") or "").lower()
     moves = kind in ("revolute", "continuous")
-    limits, unsaid = _limits(entry, kind, whose)
+    # the axis of a joint that does not turn is never used: tools write what they like there
+    axis = _axis(entry.find("axis"), whose) if moves else np.array([1.0, 0.0, 0.0])
+    limits, odd = _limits(entry, kind, whose)
     return Joint(
         name,
-        kind,
+        kind if axis is not None else "fixed",
         _end(entry, "parent", whose),
         _end(entry, "child", whose),
         _origin(entry.find("origin"), whose),
-        # the axis of a joint that does not turn is never used: tools write what they like there
-        _axis(entry.find("axis"), whose) if moves else np.array([1.0, 0.0, 0.0]),
+        np.array([1.0, 0.0, 0.0]) if axis is None else axis,
         limits,
-        unsaid,
-        _mimic(entry.find("mimic"), whose) if moves else None,
+        (*odd, *(["an axis of no length, about which nothing turns"] if axis is None else [])),
+        _mimic(entry.find("mimic"), whose) if moves and axis is not None else None,
     )
 
 
@@ -192,25 +197,35 @@ def _end(entry: ElementTree.Element, tag: str, whose: str) -> str:
 def _limits(
     entry: ElementTree.Element, kind: str, whose: str
 ) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
-    """The limits of a revolute joint, and which of them are not written."""
+    """The limits of a revolute joint, and what is odd about them. No number is no limit; inf is one, of its own."""
     limit = entry.find("limit") if kind == "revolute" else None
     if limit is None:
         return None, ()
-    low, high = (float(_numbers(limit, key, "0", 1, whose)[0]) for key in ("lower", "upper"))
-    if not low <= high:
-        raise InvalidInput(f"{whose} has limits from {low:g} to {high:g}")
-    return (low, high), tuple(key for key in ("lower", "upper") if limit.get(key) is None)
+    ends, odd = list[float](), list[str]()
+    for key, free in (("lower", -math.inf), ("upper", math.inf)):
+        if limit.get(key) is None:
+            odd.append(UNSAID)
+        try:
+            ends.append(float((limit.get(key) or "0").strip()))
+        except ValueError:
+            raise InvalidInput(
+                f"{whose}: {key} is {str(limit.get(key))[:60]!r}, where a number must stand"
+            ) from None
+        if math.isnan(ends[-1]):
+            ends[-1] = free
+            odd.append("a limit that is no number, which limits nothing")
+    if ends[0] > ends[1]:
+        odd.append("a lower limit above its upper one: they were exchanged")
+    return (min(ends), max(ends)), tuple(dict.fromkeys(odd))
 
 
-def _axis(entry: ElementTree.Element | None, whose: str) -> FloatArray:
-    """(3,) unit axis; +x where none is given."""
+def _axis(entry: ElementTree.Element | None, whose: str) -> FloatArray | None:
+    """(3,) unit axis; +x where none is given, None where it has no length."""
     if entry is None:
         return np.array([1.0, 0.0, 0.0])
     axis = _numbers(entry, "xyz", "1 0 0", 3, whose)
     length = float(np.linalg.norm(axis))
-    if not 0.0 < length < math.inf:
-        raise InvalidInput(f"{whose} turns about {axis.tolist()}, which is no axis")
-    return axis / length
+    return axis / length if 0.0 < length < math.inf else None
 
 
 def _mimic(entry: ElementTree.Element | None, whose: str) -> Mimic | None:
@@ -255,7 +270,10 @@ def _numbers(entry: ElementTree.Element, key: str, default: str | None, count: i
     text = entry.get(key, default)
     if text is None:
         raise InvalidInput(f"{whose}: its <{entry.tag}> has no {key}")
-    return _floats(text.split(), key, count, whose)
+    words = text.split() or (default or "").split()
+    if len(words) != count or any("," in word for word in words):
+        words = text.replace(",", " ").split() if count > 1 else words  # "0, 0, 1": still as many numbers
+    return _floats(words, key, count, whose)
 
 
 def _floats(words: list[str], key: str, count: int, whose: str) -> FloatArray:

@@ -108,6 +108,56 @@ def test_hulls_and_coarser_copies_are_named_and_no_surface(tmp_path: Path, name:
     assert np.isclose(volume(asset.mesh), 8.0) and sum(name in note for note in asset.notes) == 1
 
 
+def cubes(path: Path, **changes: tuple[str, str]) -> Path:
+    """Cubes by name, each with a change of its text."""
+    points, faces = box(1.0, 1.0, 1.0)
+    lines = ["#usda 1.0"]
+    for name, (old, new) in changes.items():
+        text = f"""def Mesh "{name}" {{
+            uniform token subdivisionScheme = "none"
+            point3f[] points = {[tuple(p) for p in points.tolist()]}
+            int[] faceVertexCounts = {[3] * len(faces)}
+            int[] faceVertexIndices = {faces.ravel().tolist()}
+        }}"""
+        lines.append(text.replace(old, new))
+    path.write_text("\n".join(lines))
+    return path
+
+
+FLAT = 'def Mesh "odd" {\ndouble3 xformOp:scale = (1, 0, 1)\nuniform token[] xformOpOrder = ["xformOp:scale"]\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("int[] faceVertexCounts = [3, ", "int[] faceVertexCounts = [4, "),
+        ("int[] faceVertexIndices = [", "int[] faceVertexIndices = [99, "),
+        ('def Mesh "odd" {\n', FLAT),
+        ('def Mesh "odd" {\n', FLAT.replace("1, 0, 1", "nan, 1, 1")),
+    ],
+)
+def test_one_odd_mesh_is_named_and_spoils_no_stage(tmp_path: Path, old: str, new: str) -> None:
+    for first, second in (("odd", "sound"), ("sound", "odd")):
+        path = cubes(tmp_path / f"{first}.usda", **{first: ("", ""), second: ("", "")} | {"odd": (old, new)})
+        asset = read(path)
+        assert np.isclose(volume(asset.mesh), 1.0) and sum("/odd" in note for note in asset.notes) == 1
+    with pytest.raises(FileRefused, match="/odd"):
+        read(cubes(tmp_path / "alone.usda", odd=(old, new)))
+
+
+def test_points_at_no_place_cost_their_faces_alone(tmp_path: Path) -> None:
+    unused = cubes(tmp_path / "unused.usda", a=("points = [", "points = [(nan, 0, 0), "))
+    text = unused.read_text()
+    start = text.index("faceVertexIndices = [") + len("faceVertexIndices = [")
+    end = text.index("]", start)
+    shifted = ", ".join(str(int(word) + 1) for word in text[start:end].split(","))
+    unused.write_text(text[:start] + shifted + text[end:])
+    assert np.isclose(volume(read(unused).mesh), 1.0) and not read(unused).notes
+    used = cubes(tmp_path / "used.usda", a=("points = [(", "points = [(nan, 0, 0), ("))
+    assert any("not finite" in note for note in read(used).notes)
+    assert np.isfinite(UsdHost(used).read_surface("/a").mesh.points).all()
+
+
 def test_a_rig_of_guides_alone_is_read(tmp_path: Path) -> None:
     asset = read(rig_of_parts(tmp_path / "s.usda", skin="guide", other="guide"))
     assert np.isclose(volume(asset.mesh), 2.0) and not asset.notes
