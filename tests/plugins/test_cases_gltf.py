@@ -338,6 +338,80 @@ def test_fingers_of_a_mirrored_hand_bend_to_the_palm() -> None:
         assert near < np.linalg.norm(before[k, :3, 3] - before[thumb, :3, 3]), name
 
 
+def two_bars(tmp_path: Path, scale: list[float]) -> Path:
+    """Two bars with a skin each, the second under a node of its own that is scaled."""
+    path = tmp_path / "m.glb"
+    GltfFiles().write(path, [bar()], {})
+    document, binary = parts_of(path)
+    nodes = document["nodes"]
+    roots, count = document["scenes"][0]["nodes"], len(nodes)
+    for node in [dict(node) for node in nodes]:
+        if "children" in node:
+            node["children"] = [child + count for child in node["children"]]
+        if "skin" in node:
+            node["skin"] = 1
+        nodes.append(node)
+    (skin,) = document["skins"]
+    document["skins"].append(skin | {"joints": [joint + count for joint in skin["joints"]]})
+    nodes.append({"scale": scale, "translation": [50, 0, 0], "children": [root + count for root in roots]})
+    document["scenes"][0]["nodes"] = [*roots, len(nodes) - 1]
+    return save(path, document, binary)
+
+
+@pytest.mark.parametrize("scale", [[-1, 1, 1], [1, -1, 1], [-1, -1, -1], [1, 1, 1], [-1, -1, 1]])
+def test_of_two_skins_one_may_stand_mirrored(tmp_path: Path, scale: list[float]) -> None:
+    """Two hands of one model, the left a mirrored copy: both are turned outwards, and each as it stands."""
+    asset = read(two_bars(tmp_path, scale))
+    assert asset.rig is not None
+    for surface in (asset.mesh, asset.rig.surface):
+        second = surface.points[surface.faces][:, :, 0].mean(axis=1) > 25
+        halves = [TriangleMesh(surface.points, surface.faces[half]) for half in (~second, second)]
+        assert np.allclose([volume(half) for half in halves], volume(bar().mesh), rtol=1e-4)
+    mirrored = np.prod(scale) < 0
+    assert any("1 of 2 skins" in note for note in asset.notes) == mirrored
+
+
+def test_a_joint_scaled_to_nothing_is_read_in_its_full_size_and_named(tmp_path: Path) -> None:
+    path = tmp_path / "m.glb"
+    GltfFiles().write(path, [bar()], {})
+    whole = read(path)
+    document, binary = parts_of(path)
+    joint = document["skins"][0]["joints"][-1]
+    document["nodes"][joint]["scale"] = [0, 0, 0]
+    asset = read(save(path, document, binary))
+    assert asset.rig is not None and whole.rig is not None
+    assert np.allclose(asset.rig.rest_world, whole.rig.rest_world) and np.allclose(
+        asset.mesh.points, whole.mesh.points
+    )
+    assert any(whole.rig.joints[-1] in note and "full size" in note for note in asset.notes)
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_a_vertex_of_a_joint_that_is_not_there_follows_its_others(tmp_path: Path, many: bool) -> None:
+    path = tmp_path / "m.glb"
+    GltfFiles().write(path, [bar()], {})
+    document, binary = parts_of(path)
+    gltf = open_gltf(path)
+    (mesh,) = document["meshes"]
+    attributes = mesh["primitives"][0]["attributes"]
+    joints, weights = (np.array(gltf.accessor(attributes[key])) for key in ("JOINTS_0", "WEIGHTS_0"))
+    shared = np.flatnonzero((weights > 0.05).sum(axis=1) > 1)
+    chosen = shared if many else shared[:1]
+    joints[chosen, 0] = 200
+    view = document["bufferViews"][document["accessors"][attributes["JOINTS_0"]]["bufferView"]]
+    data = bytearray(binary)
+    stored = joints.astype(
+        {5121: "u1", 5123: "<u2"}[document["accessors"][attributes["JOINTS_0"]]["componentType"]]
+    )
+    data[view["byteOffset"] : view["byteOffset"] + stored.nbytes] = stored.tobytes()
+    save(path, document, bytes(data))
+    if many:
+        with pytest.raises(FileRefused, match="names joint 200"):
+            read(path)
+    else:
+        assert any("1 vertices name a joint" in note for note in read(path).notes)
+
+
 @pytest.mark.parametrize("scale", [(-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, -1, -1), (-2, 2, 2)])
 @pytest.mark.parametrize("chain", [1, 2, 3])
 def test_reflections_anywhere_above_a_skin(tmp_path: Path, scale: tuple[int, ...], chain: int) -> None:

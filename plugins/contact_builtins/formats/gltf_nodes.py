@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,6 +54,29 @@ def read_nodes(gltf: Gltf) -> Nodes:
     names = tuple(str(entry.get("name") or f"node_{index}") for index, entry in enumerate(entries))
     hidden = _hidden(entries, order, parents, world)
     return Nodes(names, parents, world, order, _shown(gltf, order, parents), hidden, tuple(notes))
+
+
+def opened(gltf: Gltf, nodes: Nodes, shown: Collection[int]) -> tuple[FloatArray, list[str]]:
+    """(k, 4, 4) world_from_node with scales of 0 taken for 1, and the names of those of `shown` that this moves.
+
+    A joint scaled to nothing hides what it carries; nothing can be said of how it turns.
+    """
+    entries = gltf.entries("nodes")
+    flat = {index for index, entry in enumerate(entries) if 0 in entry.get("scale", ())}
+    if not flat:
+        return nodes.world, []
+    local = [_local(_unflattened(entry), index, {}) for index, entry in enumerate(entries)]
+    world, below = np.array(local), set[int]()
+    for index in nodes.order:
+        parent = int(nodes.parents[index])
+        world[index] = world[parent] @ local[index] if parent >= 0 else local[index]
+        if index in flat or parent in below:
+            below.add(index)
+    return world, [nodes.names[index] for index in nodes.order if index in below and index in shown]
+
+
+def _unflattened(entry: dict[str, Any]) -> dict[str, Any]:
+    return entry | ({"scale": [value or 1.0 for value in entry["scale"]]} if "scale" in entry else {})
 
 
 def _hidden(

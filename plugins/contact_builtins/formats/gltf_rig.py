@@ -21,6 +21,7 @@ from contact_core.hands.freedoms import guess_freedoms
 from contact_core.hands.names import mirrored_pairs
 from contact_core.rig.rig import JointFreedom, Rig
 
+_ODD = 0.01  # of the vertices of a part, how many may name joints that are not there before it is damaged
 LEAST = 1e-6  # weight below which a joint counts for nothing
 
 
@@ -149,8 +150,12 @@ def _weights(
         first = np.where(joints[:, 0] < len(table), joints[:, 0], 0)
         joints = np.where(none[:, None], first[:, None], joints)
     stray = (joints < 0) | (joints >= len(table))
-    if (stray & (weights > LEAST)).any():
-        raise InvalidInput(f"a vertex names joint {int(joints[stray & (weights > LEAST)][0])} of {len(table)}")
+    lost = stray & (weights > LEAST)
+    if lost.any():
+        many = int(lost.any(axis=1).sum())
+        if many > _ODD * len(joints) or (weights * ~stray).sum(axis=1).min() <= LEAST:
+            raise InvalidInput(f"a vertex names joint {int(joints[lost][0])} of {len(table)}")
+        notes[f"{many} vertices name a joint that their skin does not have; they follow their others alone."] = None
     weights = np.where(stray, 0.0, weights)
     result = np.zeros((len(joints), count))
     rows = np.arange(len(joints))

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contact_builtins.formats.gltf_container import Gltf
-from contact_builtins.formats.gltf_nodes import Nodes
+from contact_builtins.formats.gltf_nodes import Nodes, opened
 from contact_builtins.formats.refusal import MAX_JOINTS, bounded, named
 from contact_builtins.formats.sidecar import Sidecar
 from contact_core.arrays import FloatArray, IntArray
@@ -53,6 +53,8 @@ def read_skeleton(gltf: Gltf, nodes: Nodes, followed: Mapping[int, IntArray], si
 
     Raises FileRefused, InvalidInput.
     """
+    world, hidden = opened(gltf, nodes, {int(j) for skin in followed for j in gltf.entry("skins", skin)["joints"]})
+    nodes = replace(nodes, world=world)
     slots, binds, entries, corrections, odd = _slots(gltf, nodes, followed)
     bounded(len(slots), "joints", MAX_JOINTS)
     position = {node: k for k, node in enumerate(nodes.order)}
@@ -60,6 +62,10 @@ def read_skeleton(gltf: Gltf, nodes: Nodes, followed: Mapping[int, IntArray], si
     order = sorted(first, key=lambda node: position[node])
     names = _unique_names(nodes, order)
     parents, notes = _parents(gltf.path, nodes, order, names, sidecar)
+    if hidden:
+        notes.append(
+            f"Joints scaled to nothing, which hides what they carry, were read in their full size: {named(hidden)}."
+        )
     if odd:
         told = named([nodes.names[node] for node in odd])
         notes.append(
@@ -79,11 +85,11 @@ def read_skeleton(gltf: Gltf, nodes: Nodes, followed: Mapping[int, IntArray], si
         )
     joint_of = {slot: k for k, slot in enumerate(taken)}
     rest, bind, scaled = _normalised(nodes.world[[slots[k] for k in taken]], np.array([binds[k] for k in taken]))
-    bind, corrections, mirrored = _unmirrored(rest, bind, corrections)
+    tables = {skin: np.array([joint_of[slot] for slot in listed]) for skin, listed in entries.items()}
+    bind, corrections, mirrored = _unmirrored(rest, bind, corrections, tables)
     if mirrored:
-        notes.append(
-            "The rig stands mirrored in its scene (a negative scale above it); it was read as it stands there."
-        )
+        what = "The rig stands" if mirrored == len(tables) else f"{mirrored} of {len(tables)} skins stand"
+        notes.append(f"{what} mirrored in the scene (a negative scale above); it was read as it stands there.")
     if scaled:
         notes.append(f"Uniform joint scales ({scaled}) were taken out of the joint frames; the skin is unchanged.")
     return Skeleton(
@@ -93,7 +99,7 @@ def read_skeleton(gltf: Gltf, nodes: Nodes, followed: Mapping[int, IntArray], si
         np.array([*parents, *(place[slots[k]] for k in riders)]),
         rest,
         bind,
-        {skin: np.array([joint_of[slot] for slot in listed]) for skin, listed in entries.items()},
+        tables,
         corrections,
         tuple(notes),
     )
@@ -198,13 +204,33 @@ def _normalised(rest: FloatArray, bind: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _unmirrored(
-    rest: FloatArray, bind: FloatArray, corrections: dict[int, FloatArray]
-) -> tuple[FloatArray, dict[int, FloatArray], bool]:
-    """The bind side mirrored where (most of) the joints show their skin mirrored. rest: right-handed already."""
+    rest: FloatArray, bind: FloatArray, corrections: dict[int, FloatArray], tables: dict[int, IntArray]
+) -> tuple[FloatArray, dict[int, FloatArray], int]:
+    """The bind side mirrored for skins that (most of) their joints show mirrored, and how many skins that are.
+
+    Skins that share a joint go together. rest: right-handed already.
+    """
     turned = np.linalg.det(bind[:, :3, :3]) < 0
-    if 2 * np.count_nonzero(turned) <= len(turned):
-        return bind, corrections, False
-    return MIRROR @ bind, {skin: MIRROR @ matrix for skin, matrix in corrections.items()}, True
+    bind, corrections, count = bind.copy(), dict(corrections), 0
+    for skins in _sharing(tables):
+        own = np.unique(np.concatenate([tables[skin] for skin in skins]))
+        if 2 * np.count_nonzero(turned[own]) > len(own):
+            bind[own] = MIRROR @ bind[own]
+            corrections |= {skin: MIRROR @ corrections[skin] for skin in skins}
+            count += len(skins)
+    return bind, corrections, count
+
+
+def _sharing(tables: dict[int, IntArray]) -> list[list[int]]:
+    """The skins in groups, such that no two groups have a joint in common."""
+    groups = list[tuple[list[int], set[int]]]()
+    for skin, table in tables.items():
+        joints, skins = set(table.tolist()), [skin]
+        for other in [group for group in groups if group[1] & joints]:
+            groups.remove(other)
+            skins, joints = other[0] + skins, other[1] | joints
+        groups.append((skins, joints))
+    return [skins for skins, _ in groups]
 
 
 def _parents(
