@@ -137,6 +137,7 @@ class Session(GraspingSession):
             session._derived.bring(asset.mesh)
             if asset.rig is not None:
                 session.rigs[name] = asset.rig
+        session._opening_notes = tuple(f"{name}: {note}" for name, asset in assets.items() for note in asset.notes)
         return session
 
     # -- files ---------------------------------------------------------------------------------------------------
@@ -184,7 +185,7 @@ class Session(GraspingSession):
     def notes(self) -> tuple[str, ...]:
         """Sentences on what opening the file or the scene found, and on surfaces that got proxies since."""
         own = self._file.notes if self._file is not None else ()
-        missing = tuple(self._binding.missing.values()) if self._binding is not None else ()
+        scene = self._binding.notes if self._binding is not None else ()
         before = {surface.carrier_digest for surface in self.history.base.surfaces.values()}
         proxied = tuple(
             f"the contacts of {surface.name!r} run on a proxy now, a closed surface near its mesh"
@@ -192,7 +193,7 @@ class Session(GraspingSession):
             for surface in self.document.surfaces.values()
             if surface.proxy is not None and surface.carrier_digest not in before
         )
-        return self._opening_notes + own + missing + proxied
+        return self._opening_notes + own + scene + proxied
 
     @property
     def read_only(self) -> bool:

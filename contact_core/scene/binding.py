@@ -25,6 +25,7 @@ from contact_core.scene.host import (
     BoneChoosing,
     CurveWriting,
     HostAdapter,
+    LossTelling,
     PoseWriting,
     RigReading,
     SceneObject,
@@ -60,6 +61,7 @@ class Binding:
         self._scene: SceneReading | None = host if isinstance(host, SceneReading) else None
         self.surfaces: dict[str, BoundSurface] = {}
         self.missing: dict[str, str] = {}
+        self._of_scene: tuple[str, ...] = ()
         self._evaluated: dict[str, HostRig | None] = {}
 
     @property
@@ -76,6 +78,13 @@ class Binding:
     def key(self) -> str:
         """The namespace of the document's extras that remembers the object of each surface: "host.usd"."""
         return "host" if self._host is None else f"host.{self._host.name}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What reading the scene found: of the scene as a whole when it was bound, of each surface, what is
+        missing."""
+        told = (f"{name}: {note}" for name, found in self.surfaces.items() for note in found.asset.notes)
+        return (*self._of_scene, *told, *self.missing.values())
 
     def objects(self) -> tuple[SceneObject, ...]:
         """What the scene holds; nothing without a scene."""
@@ -94,6 +103,8 @@ class Binding:
         self._evaluated.clear()
         if self._scene is None:
             return document
+        losses = self._scene.losses() if isinstance(self._scene, LossTelling) else ()
+        self._of_scene = (*self._scene.space().notes, *losses)
         read: dict[str, Asset] = {}
         remembered = document.extras.get(self.key, {})
         for surface in document.surfaces.values():

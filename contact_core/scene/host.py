@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,6 +114,16 @@ class SceneReading(HostAdapter, Protocol):
     @abstractmethod
     def placement(self, object_id: str, frame: float | None = None) -> FloatArray:
         """(4, 4) rigid world_from_surface; of a rig, where its space lies in the scene."""
+        ...
+
+
+@runtime_checkable
+class LossTelling(HostAdapter, Protocol):
+    """A host that knows what of its scene it does not read."""
+
+    @abstractmethod
+    def losses(self) -> Sequence[str]:
+        """Sentences on shapes of the scene that are no objects here, or not all that they could be."""
         ...
 
 

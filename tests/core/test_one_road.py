@@ -228,3 +228,11 @@ def test_a_session_ends_with_its_scene() -> None:
     assert host.stored_stamp() is None and "tip" in session.document.patches  # it can still be read
     with contact.Session(host=host, objects=None) as fresh:
         assert not fresh.document.patches
+
+
+def test_a_session_on_files_tells_what_their_readers_told(tmp_path: Path) -> None:
+    (tmp_path / "thing.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\nl 1 2\n"
+    )
+    with contact.new(thing=tmp_path / "thing.obj", arm=assets()[ARM]) as session:
+        assert len(session.notes) == 1 and session.notes[0].startswith("thing: 1 points, lines")

@@ -53,10 +53,8 @@ class UsdFiles:
                 told = [f"meshes beside the rig, which are not part of it: {named(beside)}."] if beside else []
                 return replace(rig, notes=(*host.space().notes, *rig.notes, *told, *host.losses()))
             if rigs or not items:
-                from contact_usd.primitives import unchosen_variants
-
                 found = f"{len(rigs)} rigs ({', '.join(rigs[:6])})" if rigs else "no meshes"
-                told = [*host.space().notes, *host.losses(), *unchosen_variants(host.stage)]
+                told = [*host.space().notes, *host.losses()]
                 found += "".join(f" ({note.rstrip('.')})" for note in told[:3])
                 raise FileRefused(
                     f"{path} has {found}; as a file it is read where it has one rig, or meshes alone."

@@ -19,6 +19,7 @@ from contact_core.rig.rig import Pose
 from contact_core.scene.host import (
     DocumentStamp,
     DocumentStorage,
+    LossTelling,
     PoseWriting,
     RigReading,
     SceneObject,
@@ -40,14 +41,16 @@ except ImportError as error:
 
 from contact_usd import export, mesh, poses, registration, skel, stage_io, storage
 from contact_usd.layer import LayerUndo
-from contact_usd.primitives import is_primitive, silent_losses
+from contact_usd.primitives import is_primitive, silent_losses, unchosen_variants
 
 registration.register()
 
 Binding = tuple[UsdSkel.Cache, UsdSkel.Binding]
 
 
-class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStorage, Undo, SelectionReading):
+class UsdHost(
+    SceneReading, LossTelling, SceneWriting, RigReading, PoseWriting, DocumentStorage, Undo, SelectionReading
+):
     """A USD stage. path: a file; without one an empty stage of `space`; `on` takes a stage that is open.
 
     Object ids are prim paths: of a Mesh, or of a Skeleton for a rig. Raises FileRefused.
@@ -119,7 +122,11 @@ class UsdHost(SceneReading, SceneWriting, RigReading, PoseWriting, DocumentStora
         """Notes on shapes of the stage that are no objects here, or not all that they could be."""
         rigs = [binding for _, binding in self._rigs().values()]
         influenced = {str(q.GetPrim().GetPath()) for b in rigs for q in skel.influenced_meshes(b)}
-        return [*(note for b in rigs for note in skel.losses(b)), *silent_losses(self.stage, influenced)]
+        return [
+            *(note for b in rigs for note in skel.losses(b)),
+            *silent_losses(self.stage, influenced),
+            *unchosen_variants(self.stage),
+        ]
 
     def read_surface(self, object_id: str) -> Asset:
         if object_id in self._rigs():

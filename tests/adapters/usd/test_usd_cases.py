@@ -11,6 +11,7 @@ pytest.importorskip("pxr", reason="usd-core is not installed")
 
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
+import contact_core
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
 from contact_core.geometry.solids import box
@@ -229,3 +230,17 @@ def test_primitives_have_their_size_and_axis(
     extent["XYZ".index(axis)] = reach[1]
     assert np.allclose(np.abs(mesh.points).max(0), extent, atol=1e-6)
     assert 0.985 * wanted < volume(mesh) < wanted * (1 + 1e-6)
+
+
+def test_a_session_on_a_stage_tells_what_was_lost(tmp_path: Path) -> None:
+    """As a file the stage tells it; opened as a scene it told nothing."""
+    path = cubes(tmp_path / "s.usda", sound=("", ""), odd=("points = [(", "points = [(nan, 0, 0), ("))
+    gap = 'def "gap" (prepend references = @./gone.usda@) {}\n'
+    copies = 'def PointInstancer "grass" { int[] protoIndices = [0, 0]\n}\n'
+    path.write_text(path.read_text() + "\n" + gap + copies)
+    with contact_core.open(path) as session:
+        told = " ".join(session.notes)
+    for words in ("gone.usda", "/grass scatters 2 copies", "odd: ", "not finite"):
+        assert words in told
+    with contact_core.open(cubes(tmp_path / "t.usda", sound=("", ""))) as session:
+        assert session.notes == ()
