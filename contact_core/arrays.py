@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
+import mmap
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ Int32Array = npt.NDArray[np.int32]
 SingleArray = npt.NDArray[np.float32]
 ComplexArray = npt.NDArray[np.complex128]
 
+_SPARSE = 1 << 22  # bytes: below, memory is not worth two ways of asking for it
 SMALL = 4096  # numbers of an array for which a call costs more than a pass
 
 
@@ -65,6 +68,23 @@ def all_finite(array: npt.NDArray[Any]) -> bool:
     ):  # one pass, no array; squares may overflow
         return True
     return bool(np.isfinite(array).all())
+
+
+def sparse_zeros(shape: tuple[int, ...]) -> FloatArray:
+    """Zeros of which only what is written to takes memory, by pages of 4 kB.
+
+    numpy's own large arrays come in pages of 2 MB on Linux: an array that is written to here and there would soon
+    be in memory as a whole.
+    """
+    size = 8 * math.prod(shape)
+    if size < _SPARSE:
+        return np.zeros(shape)
+    if not hasattr(mmap, "MAP_PRIVATE"):  # Windows
+        return np.frombuffer(mmap.mmap(-1, size)).reshape(shape)
+    pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANON)  # private: a forked process has its own
+    with contextlib.suppress(AttributeError, OSError):  # systems that have no such pages
+        pages.madvise(mmap.MADV_NOHUGEPAGE)
+    return np.frombuffer(pages).reshape(shape)
 
 
 def digest(*arrays: npt.NDArray[Any]) -> str:

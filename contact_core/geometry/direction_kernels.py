@@ -19,7 +19,7 @@ from contact_core.geometry.tangent_kernels import (
     turned,
     vertex_scale,
 )
-from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, preceding
+from contact_core.geometry.topology_kernels import BOUNDARY_VERTEX, first_of, preceding, twin_of
 
 
 @inner
@@ -86,14 +86,15 @@ def headings_of_directions(
             x, y, _ = in_frame(3 * element, dx, dy, dz, points, faces)
         elif on == ON_EDGE:
             x, y, _ = in_frame(element, dx, dy, dz, points, faces)
-            if mesh.twin[element] >= 0:
-                _, beyond, _ = in_frame(mesh.twin[element], dx, dy, dz, points, faces)
+            other = twin_of(element, mesh)
+            if other >= 0:
+                _, beyond, _ = in_frame(other, dx, dy, dz, points, faces)
                 y = y if y >= beyond else -beyond
             else:
                 y = max(y, 0.0)
         else:
             least, angle = math.inf, 0.0
-            h = mesh.first[element]
+            h = first_of(element, mesh)
             while True:
                 x, y, z = in_frame(h, dx, dy, dz, points, faces)
                 corner = corner_angle(h, mesh)
@@ -105,7 +106,7 @@ def headings_of_directions(
                 miss = norm(across, z) if along > 0.0 else norm(norm(across, z), along) - along
                 if miss < least:
                     least, angle = miss, mesh.shape[h, 3] + alpha
-                h = mesh.twin[preceding(h)]
+                h = twin_of(preceding(h), mesh)
                 if h < 0 or h == mesh.first[element]:
                     break
             angle *= vertex_scale(element, mesh)
@@ -135,8 +136,9 @@ def directions_of_headings(
             h = 3 * element
         elif on == ON_EDGE:
             h = element
-            if y < 0.0 and mesh.twin[h] >= 0:
-                h, x, y = mesh.twin[h], -x, -y
+            other = twin_of(h, mesh)
+            if y < 0.0 and other >= 0:
+                h, x, y = other, -x, -y
         else:
             angle = math.atan2(y, x)
             if angle < 0.0 and mesh.kind[element] != BOUNDARY_VERTEX:

@@ -6,6 +6,7 @@ from typing import Final
 
 BOUNDARY: Final = -1  # a twin: no face on the other side
 BLOCKED: Final = -2  # a twin: the edge is not manifold, or its face has no three corners
+UNVISITED: Final = -3  # UNVISITED - h, a twin: halfedge h, whose face no query has come to yet
 INTERIOR_VERTEX: Final = 0
 BOUNDARY_VERTEX: Final = 1
 BLOCKED_VERTEX: Final = 2  # its faces do not form one fan

@@ -8,7 +8,7 @@ from contact_core.arrays import BoolArray, FloatArray
 from contact_core.geometry.jit import inlined, kernel
 from contact_core.geometry.kernel_arrays import Halfedges, Points, Queue
 from contact_core.geometry.queue_kernels import HEAP_SIZE, OVERFLOW, heap_pop, heap_push
-from contact_core.geometry.topology_kernels import following, preceding
+from contact_core.geometry.topology_kernels import first_of, following, preceding, twin_of, visit
 
 LOWER = 1.0 - 1e-9  # a distance that is hardly lower is not lowered: rounding would go round in circles
 
@@ -50,6 +50,7 @@ def spread(
     sources, mesh, queue = Points(*sources), Halfedges(*mesh), Queue(*queue)
     for i in range(len(sources.faces)):
         h, b = 3 * sources.faces[i], sources.barycentric[i]
+        visit(sources.faces[i], mesh)
         length, x, y = mesh.shape[h, 0], mesh.shape[h, 1], mesh.shape[h, 2]
         at_x, at_y = b[1] * length + b[2] * x, b[2] * y
         lower(mesh.tail[h], math.sqrt(at_x**2 + at_y**2), reach, distances, lowered, queue)
@@ -60,7 +61,7 @@ def spread(
         v = heap_pop(queue)
         if key > distances[v]:
             continue
-        h = mesh.first[v]
+        h = first_of(v, mesh)
         while True:
             onto, back = following(h), preceding(h)
             a, b = mesh.tail[onto], mesh.tail[back]
@@ -70,7 +71,7 @@ def spread(
                 lower(b, unfolded(h, key, distances[a], mesh), reach, distances, lowered, queue)
             if lowered[b]:
                 lower(a, unfolded(back, distances[b], key, mesh), reach, distances, lowered, queue)
-            h = mesh.twin[back]
+            h = twin_of(back, mesh)
             if h < 0 or h == mesh.first[v]:
                 break
         if queue.state[OVERFLOW]:

@@ -17,6 +17,7 @@ import numba
 import numpy as np
 from numba.core import event
 from numba.core.registry import CPUDispatcher
+from numba.extending import intrinsic, overload
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -33,7 +34,7 @@ _kernels: set[int] = set()  # ids of our dispatchers: other people's kernels com
 
 # numba's cache asks whether a kernel's own file changed, but not whether the kernels that it calls did: machine
 # code compiled from older helpers would live on after an upgrade. So every kernel carries the stamp of them all.
-_files = [path.stat() for path in sorted(Path(__file__).parents[1].glob("*/*kernel*.py"))]
+_files = [path.stat() for path in [Path(__file__), *sorted(Path(__file__).parents[1].glob("*/*kernel*.py"))]]
 _stamp = (max(file.st_mtime for file in _files), sum(file.st_size for file in _files))
 
 
@@ -63,6 +64,25 @@ def inner(function: Function) -> Function:
     """A part of kernels that Python never calls: compiled without what Python would call it by, a third of the time
     that it takes to compile."""
     return _without_entry(_compiled(function, {**_OPTIONS, **_INNER}))
+
+
+def memory_fence() -> None:
+    """In kernels: what was written before is seen by other threads before what is written after, and what is read
+    after is read after. In Python nothing is to be done."""
+
+
+@intrinsic
+def _fence(context: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.fence("acq_rel")
+        return context.get_dummy_value()
+
+    return numba.types.void(), generate
+
+
+@overload(memory_fence)  # not inline="always", which loses the writes before it (numba 0.68)
+def _compiled_memory_fence() -> Any:
+    return lambda: _fence()
 
 
 class _Part(CPUDispatcher):  # type: ignore[misc]

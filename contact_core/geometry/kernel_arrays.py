@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeVar
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 
 Group = TypeVar("Group", bound=tuple[object, ...])
 
@@ -21,7 +21,14 @@ def plain(group: Group) -> Group:
 
 
 class Halfedges(NamedTuple):
-    """Connectivity and intrinsic geometry of a mesh: the fields of `topology.Topology`."""
+    """Connectivity and intrinsic geometry of a mesh: see `topology.Topology`, which says what the arrays are.
+
+    Of a large mesh they are written where queries come. Kernels go from face to face by `topology_kernels.twin_of`,
+    and begin in a face by `visit` or `first_of`; until then a twin is UNVISITED - h, a record of `shape` is 0 and
+    an `angle_sum` is negative.
+    bends: (n,) whether shortest paths can bend round a vertex, which a blocked one counts as doing.
+    points: (n, 3), from which records are made.
+    """
 
     tail: IntArray
     twin: IntArray
@@ -29,6 +36,8 @@ class Halfedges(NamedTuple):
     first: IntArray
     angle_sum: FloatArray
     kind: IntArray
+    bends: BoolArray
+    points: FloatArray
 
 
 class Labels(NamedTuple):

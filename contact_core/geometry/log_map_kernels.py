@@ -31,8 +31,10 @@ from contact_core.geometry.tangent_kernels import (
 from contact_core.geometry.topology_kernels import (
     BLOCKED,
     BLOCKED_VERTEX,
+    first_of,
     following,
     preceding,
+    twin_of,
 )
 from contact_core.geometry.window_kernels import (
     B0,
@@ -198,13 +200,13 @@ def seed(
         return MET_BLOCKED_EDGE, element
     if on == ON_VERTEX and mesh.kind[element] >= BLOCKED_VERTEX:
         return MET_BLOCKED_VERTEX, element
-    if on == ON_EDGE and mesh.twin[element] == BLOCKED:
+    if on == ON_EDGE and twin_of(element, mesh) == BLOCKED:
         return MET_BLOCKED_EDGE, element
     base = element
     if on == ON_FACE:
         base = 3 * element
     elif on == ON_VERTEX:
-        base = mesh.first[element]
+        base = first_of(element, mesh)
     start = base
     while True:
         windows_of_source(base, x, y, on, -1 - s, bound, mesh, labels, windows, queue, goal)
@@ -213,9 +215,9 @@ def seed(
             break
         if on == ON_EDGE:
             x = mesh.shape[base, 0] - x
-            base = mesh.twin[base]
+            base = twin_of(base, mesh)
         else:
-            base = mesh.twin[preceding(base)]
+            base = twin_of(preceding(base), mesh)
         if base < 0 or base == start:
             break
     if on == ON_VERTEX:
@@ -272,7 +274,10 @@ def search(
             windows_of_pseudo_source(v, bound, mesh, labels, windows, queue, goal)
         else:
             if windows.integers[item, HALFEDGE] < 0:
-                return MET_BLOCKED_EDGE, -1 - windows.integers[item, HALFEDGE]
+                edge = -1 - windows.integers[item, HALFEDGE]
+                windows.integers[item, HALFEDGE] = twin_of(edge, mesh)
+                if windows.integers[item, HALFEDGE] == BLOCKED:
+                    return MET_BLOCKED_EDGE, edge
             if from_heap and goal.sought == 0:
                 base = 3 * (windows.integers[item, HALFEDGE] // 3)
                 queue.keys[len(queue.keys) - 1] = key + min(

@@ -11,6 +11,7 @@ from contact_core.arrays import FloatArray, IntArray, digest, frozen
 from contact_core.errors import InvalidInput
 
 _LARGEST = 1e60  # coordinate: products of four lengths neither overflow nor vanish
+_AT_A_TIME = 1 << 18  # corners
 
 
 class TriangleMesh:
@@ -56,7 +57,9 @@ class TriangleMesh:
         """(n,) the first corner 3 f + k of face f that is each vertex; -1 where no face uses it."""
         corners = np.full(len(self.points), -1, np.int64)
         flat = self.faces.ravel()
-        corners[flat[::-1]] = np.arange(len(flat) - 1, -1, -1)
+        for end in range(len(flat), 0, -_AT_A_TIME):  # the first is written last
+            begin = max(end - _AT_A_TIME, 0)
+            corners[flat[begin:end][::-1]] = np.arange(end - 1, begin - 1, -1)
         return corners
 
     @cached_property

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import math
 
-from contact_core.geometry.elements import EXCESS
 from contact_core.geometry.jit import constant, inlined, inner
 from contact_core.geometry.kernel_arrays import Halfedges, Points
 from contact_core.geometry.topology_kernels import (
-    BLOCKED_VERTEX,
     BOUNDARY_VERTEX,
+    first_of,
     following,
     has_three_corners,
     preceding,
+    twin_of,
+    visit,
 )
 
 ON_FACE = constant(0)  # element: face; x, y in the frame of halfedge 3f
@@ -35,6 +36,7 @@ PI = math.pi
 def place(f: int, b0: float, b1: float, b2: float, mesh: Halfedges) -> tuple[int, int, float, float]:
     """The place of a point given by face and barycentric coordinates."""
     h = 3 * f
+    visit(f, mesh)
     l0, l1, l2 = mesh.shape[h, 0], mesh.shape[h + 1, 0], mesh.shape[h + 2, 0]
     near = SNAP * max(l0, l1, l2)
     if b1 * l0 + b2 * l2 <= near:
@@ -68,8 +70,9 @@ def place_of(points: Points, i: int, mesh: Halfedges) -> tuple[int, int, float, 
 @inlined
 def on_edge(h: int, x: float, mesh: Halfedges) -> tuple[int, int, float, float]:
     """The place at x along halfedge h."""
-    if 0 <= mesh.twin[h] < h:
-        return ON_EDGE, mesh.twin[h], mesh.shape[h, 0] - x, 0.0
+    other = twin_of(h, mesh)
+    if 0 <= other < h:
+        return ON_EDGE, other, mesh.shape[h, 0] - x, 0.0
     return ON_EDGE, h, x, 0.0
 
 
@@ -137,14 +140,6 @@ def vertex_scale(v: int, mesh: Halfedges) -> float:
 
 
 @inlined
-def bends_paths(v: int, mesh: Halfedges) -> bool:
-    """Whether shortest paths can bend round vertex v. A blocked vertex counts: it is refused when met."""
-    if mesh.kind[v] == BOUNDARY_VERTEX:
-        return mesh.angle_sum[v] > PI + EXCESS
-    return mesh.kind[v] == BLOCKED_VERTEX or mesh.angle_sum[v] > 2.0 * PI + EXCESS
-
-
-@inlined
 def corner_of(f: int, v: int, mesh: Halfedges) -> int:
     """The halfedge of face f that leaves vertex v."""
     if mesh.tail[3 * f] == v:
@@ -155,9 +150,9 @@ def corner_of(f: int, v: int, mesh: Halfedges) -> int:
 @inner
 def corner_at_angle(v: int, angle: float, mesh: Halfedges) -> tuple[int, float]:
     """The corner (by its halfedge) of v that holds an angle round it, and the angle within that corner."""
-    h = mesh.first[v]
+    h = first_of(v, mesh)
     while True:
-        onward = mesh.twin[preceding(h)]
+        onward = twin_of(preceding(h), mesh)
         if onward < 0 or onward == mesh.first[v] or angle < mesh.shape[onward, 3]:
             return h, min(max(angle - mesh.shape[h, 3], 0.0), corner_angle(h, mesh))
         h = onward
@@ -180,7 +175,7 @@ def heading_at(on: int, element: int, h: int, x: float, y: float, mesh: Halfedge
         if element // 3 == h // 3:
             cos, sin = direction_in_face(element, mesh)
             return turned_back(fx, fy, cos, sin)
-        cos, sin = direction_in_face(mesh.twin[element], mesh)
+        cos, sin = direction_in_face(twin_of(element, mesh), mesh)
         return turned_back(-fx, -fy, cos, sin)
     corner = corner_of(h // 3, element, mesh)
     cos, sin = direction_in_face(corner, mesh)

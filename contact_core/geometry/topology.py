@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray, frozen
+from contact_core.arrays import FloatArray, IntArray, frozen, sparse_zeros
 from contact_core.errors import InvalidInput, NotManifold
 from contact_core.geometry.elements import (
     BLOCKED,
@@ -23,8 +24,10 @@ from contact_core.geometry.elements import (
     UNUSED_VERTEX,
 )
 from contact_core.geometry.flat_faces import mollify
-from contact_core.geometry.kernel_arrays import Halfedges
+from contact_core.geometry.kernel_arrays import Halfedges, plain
 from contact_core.geometry.mesh import TriangleMesh
+
+VISITED_AT_ONCE = 1_400_000  # faces: of a larger mesh records are written where queries come
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +42,13 @@ class Topology:
     first: (n,) first halfedge of each vertex; on a boundary the clockwise-most. -1 where unused.
     angle_sum: (n,) sum of the corner angles round each vertex (radians).
     kind: (n,) INTERIOR_VERTEX, BOUNDARY_VERTEX, BLOCKED_VERTEX or UNUSED_VERTEX.
+
+    halfedges: the arrays as kernels take them. Of a mesh of more than VISITED_AT_ONCE faces that has none without
+    area, records are written where queries come, for they take nearly three times the memory of the mesh; whoever
+    asks for twin, shape or angle_sum has them all written (ADR 0118).
     """
 
-    tail: IntArray
-    twin: IntArray
-    shape: FloatArray
-    first: IntArray
-    angle_sum: FloatArray
-    kind: IntArray
+    halfedges: Halfedges
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Topology:
@@ -66,47 +68,80 @@ class Topology:
         from contact_core.geometry import topology_kernels as kernels
 
         n, count = len(mesh.points), 3 * len(mesh.faces)
-        shape = np.zeros((count, 4))
+        at_once = len(mesh.faces) <= VISITED_AT_ONCE
+        shape = np.zeros((count, 4)) if at_once else sparse_zeros((count, 4))
         tail = mesh.faces.ravel()
-        lengthless, flat = kernels.measure(mesh.points, mesh.faces, shape)
+        lengthless, flat = kernels.measure(mesh.points, mesh.faces, shape, at_once)
+        if (lengthless or flat) and not at_once:
+            at_once = True
+            kernels.measure(mesh.points, mesh.faces, shape, at_once)
         if lengthless:
             tail = np.empty(count, np.int64)
             kernels.merge_lengthless_edges(mesh.faces, shape, np.arange(n), tail)
             tail.setflags(write=False)
-        degree = np.zeros(n, np.int64)
-        twin = np.full(count, BOUNDARY, np.int64)
-        kernels.pair_halfedges(tail, degree, np.full(n, -1, np.int64), np.empty(count, np.int64), twin)
+        degree: Any = np.zeros(n, np.int32)
+        twin: Any = np.full(count, BOUNDARY, np.int32)
+        kernels.pair_halfedges(tail, degree, np.full(n, -1, np.int32), np.empty(count, np.int32), twin)
         first = np.full(n, -1, np.int64)
         angle_sum = np.zeros(n)
-        kind = np.full(n, UNUSED_VERTEX, np.int64)
-        kernels.order_fans(tail, twin, shape, degree, first, angle_sum, kind)
+        kind: Any = np.full(n, UNUSED_VERTEX, np.int8)
+        bends = np.zeros(n, bool)
+        fans = (degree, first, angle_sum, kind, bends, at_once)
+        kernels.order_fans(tail, twin, shape, mesh.points, *fans)
         if flat:
             straight = np.where(kind == BOUNDARY_VERTEX, np.pi, 2.0 * np.pi)
             if mollify(twin, shape, (angle_sum > straight + EXCESS)[tail]):
-                kernels.order_fans(tail, twin, shape, degree, first, angle_sum, kind)
-        for array in (twin, shape, first, angle_sum, kind):
-            array.setflags(write=False)
-        return cls(tail, twin, shape, first, angle_sum, kind)
+                kernels.order_fans(tail, twin, shape, mesh.points, *fans)
+        if not at_once:
+            kernels.leave_unvisited(twin, angle_sum)
+        return cls(Halfedges(tail, twin, shape, first, angle_sum, kind, bends, mesh.points))
 
     @property
-    def halfedges(self) -> Halfedges:
-        """The arrays in one group, as kernels take them."""
-        return Halfedges(self.tail, self.twin, self.shape, self.first, self.angle_sum, self.kind)
+    def tail(self) -> IntArray:
+        return self.halfedges.tail
+
+    @property
+    def first(self) -> IntArray:
+        return _read_only(self.halfedges.first)
+
+    @property
+    def kind(self) -> IntArray:
+        return _read_only(self.halfedges.kind)
+
+    @property
+    def twin(self) -> IntArray:
+        return _read_only(self._written.twin)
+
+    @property
+    def shape(self) -> FloatArray:
+        return _read_only(self._written.shape)
+
+    @property
+    def angle_sum(self) -> FloatArray:
+        return _read_only(self._written.angle_sum)
+
+    @cached_property
+    def _written(self) -> Halfedges:
+        """The arrays, with no record left out."""
+        from contact_core.geometry.topology_kernels import write_all
+
+        write_all(plain(self.halfedges))
+        return self.halfedges
 
     @cached_property
     def is_manifold(self) -> bool:
         """Whether no edge and no vertex is blocked."""
-        return not ((self.twin == BLOCKED).any() or (self.kind == BLOCKED_VERTEX).any())
+        return not ((self.halfedges.twin == BLOCKED).any() or (self.kind == BLOCKED_VERTEX).any())
 
     @cached_property
     def boundary_halfedges(self) -> IntArray:
         """(b,) halfedges with no face on the other side."""
-        return frozen(np.flatnonzero(self.twin == BOUNDARY), np.int64, (None,), "boundary_halfedges")
+        return frozen(np.flatnonzero(self.halfedges.twin == BOUNDARY), np.int64, (None,), "boundary_halfedges")
 
     def scale(self, vertex: int) -> float:
         """Factor from corner angles to angles of the vertex's tangent frame: 2 pi (boundary: pi) / angle sum."""
         whole = np.pi if self.kind[vertex] == BOUNDARY_VERTEX else 2.0 * np.pi
-        return float(whole / self.angle_sum[vertex])
+        return float(whole / abs(self.halfedges.angle_sum[vertex]))
 
     def refuse_halfedge(self, halfedge: int, doing: str) -> NotManifold:
         """The error for a query that met a blocked halfedge."""
@@ -131,6 +166,12 @@ class Topology:
             f"{doing} needs a manifold surface, but the faces round vertex {int(vertex)} do not form a single fan. "
             f"Split that vertex, or stay away from it."
         )
+
+
+def _read_only(array: Any) -> Any:
+    view = array.view()
+    view.setflags(write=False)
+    return view
 
 
 def closed_manifold(mesh: TriangleMesh, name: str) -> TriangleMesh:

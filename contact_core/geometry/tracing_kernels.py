@@ -20,7 +20,6 @@ from contact_core.geometry.tangent_kernels import (
     PI,
     SNAP,
     angle_round_vertex,
-    bends_paths,
     corner_at_angle,
     direction_of_next,
     heading_at,
@@ -37,6 +36,8 @@ from contact_core.geometry.topology_kernels import (
     BOUNDARY_VERTEX,
     following,
     preceding,
+    twin_of,
+    wide,
 )
 
 DONE = constant(0)
@@ -59,7 +60,7 @@ def start_on_edge(h: int, x: float, dx: float, dy: float, mesh: Halfedges) -> tu
     """Where a walk from an edge point begins: (halfedge of the face it enters or a negative twin, x, dx, dy)."""
     if dy >= 0.0:
         return h, x, dx, dy
-    other = mesh.twin[h]
+    other = twin_of(h, mesh)
     if other == BOUNDARY and dy > -GRAZE:
         return h, x, dx, 0.0
     return other, mesh.shape[h, 0] - x, -dx, -dy
@@ -216,7 +217,7 @@ def walk(
                 corner = h
                 bx, by = -dx, -dy
             vertex = mesh.tail[corner]
-            if to_bend and bends_paths(vertex, mesh):
+            if to_bend and mesh.bends[vertex]:
                 return MET_BEND, corner, miss, 0.0, bx, by, remaining, line_end
             if mesh.kind[vertex] == BLOCKED_VERTEX:
                 return MET_BLOCKED_VERTEX, vertex, x, y, dx, dy, remaining, line_end
@@ -224,7 +225,9 @@ def walk(
             if angle < 0.0:
                 return DONE, h, x, y, dx, dy, remaining, line_end
             continue
-        other = mesh.twin[edge]
+        other = wide(mesh.twin[edge])
+        if other < BLOCKED:
+            other = twin_of(edge, mesh)
         if other < 0:
             status = DONE if other == BOUNDARY else MET_BLOCKED_EDGE
             if to_joint and remaining <= JOINT * size:
@@ -295,7 +298,7 @@ def settle(
         for k in range(3):
             points.barycentric[i, k] = 1.0 if mesh.tail[3 * f + k] == element else 0.0
     elif on == ON_EDGE:
-        edge = element if element // 3 == f else mesh.twin[element]
+        edge = element if element // 3 == f else twin_of(element, mesh)
         k = edge % 3
         t = px / mesh.shape[edge, 0]
         if edge != element:

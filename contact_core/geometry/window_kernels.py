@@ -33,7 +33,6 @@ from contact_core.geometry.tangent_kernels import (
     ON_VERTEX,
     PI,
     angle_round_vertex,
-    bends_paths,
     corner_angle,
     direction_in_face,
     direction_of_next,
@@ -43,15 +42,18 @@ from contact_core.geometry.topology_kernels import (
     BLOCKED,
     BOUNDARY,
     BOUNDARY_VERTEX,
+    first_of,
     following,
     preceding,
+    twin_of,
+    wide,
 )
 
 # Columns of the float record of a window
 B0, B1, SX, SY, SIGMA, COS, SIN, SPLIT_DISTANCE, SPLIT_CROSSING, SLACK = (constant(i) for i in range(10))
 # Columns of its integer record. root: source s as -1 - s, or a vertex. wedge: the halfedge in whose frame
 # directions at the root are given. side: which child of its parent it is. A free record links to the next one in
-# HALFEDGE.
+# HALFEDGE, and one that has not entered its face yet may have -1 - the halfedge that it leaves through.
 HALFEDGE, ROOT, WEDGE, SIDE = constant(0), constant(1), constant(2), constant(3)
 ONLY_CHILD, LEFT_CHILD, RIGHT_CHILD = constant(0), constant(1), constant(2)
 
@@ -118,7 +120,7 @@ def update_vertex(
     leg[v, 2] = angle_round_vertex(path.halfedge, path.x, path.y, mesh)
     origin[v, 0], origin[v, 1], origin[v, 2], origin[v, 3] = path.root, path.wedge, 0, path.touches
     key = vertex_key(v, path.distance, goal)
-    if key <= bound and bends_paths(v, mesh):
+    if key <= bound and mesh.bends[v]:
         heap_push(key, -1 - v, queue)
 
 
@@ -136,7 +138,7 @@ def push_window(
     """Queue a window that leaves a face through `edge`, unless it is empty, off the surface, too far, or dominated
     by a path through a vertex next to it (Xin and Wang 2009)."""
     sx, sigma, side = window.sx, window.sigma, window.side
-    h = mesh.twin[edge]
+    h = wide(mesh.twin[edge])
     length = mesh.shape[edge, 0]
     b0, b1, sy = max(window.b0, 0.0), min(window.b1, length), min(window.sy, 0.0)
     if not b1 > b0 or h == BOUNDARY:
@@ -173,8 +175,9 @@ def push_window(
     record[B0], record[B1], record[SX], record[SY], record[SIGMA] = b0, b1, sx, sy, sigma
     record[COS], record[SIN], record[SLACK] = window.cos, window.sin, window.slack
     record[SPLIT_DISTANCE], record[SPLIT_CROSSING] = window.split_distance, window.split_crossing
-    # a blocked edge waits in the heap like any other: it is refused only when the search really gets there
-    windows.integers[w, HALFEDGE] = h if h != BLOCKED else -1 - edge
+    # a blocked edge waits in the heap like any other: it is refused only when the search really gets there; and a
+    # face that no query has come to yet is written only then
+    windows.integers[w, HALFEDGE] = h if h >= 0 else -1 - edge
     windows.integers[w, ROOT], windows.integers[w, WEDGE], windows.integers[w, SIDE] = (
         window.root,
         window.wedge,
@@ -301,7 +304,7 @@ def is_displaced(w: int, mesh: Halfedges, labels: Labels, windows: Windows) -> b
     split_distance = windows.floats[w, SPLIT_DISTANCE]
     if split_distance < 0.0:
         return False
-    edge = mesh.twin[windows.integers[w, HALFEDGE]]
+    edge = wide(mesh.twin[windows.integers[w, HALFEDGE]])
     side = windows.integers[w, SIDE]
     entry = following(edge) if side == LEFT_CHILD else preceding(edge)
     if windows.occupied[entry, 1] >= split_distance * SURELY:
@@ -321,7 +324,7 @@ def windows_of_pseudo_source(
     rim = mesh.kind[v] == BOUNDARY_VERTEX
     low, high = 0.0 if rim else back + PI - total, back - PI
     low_too, high_too = back + PI, total if rim else back + total - PI
-    h = mesh.first[v]
+    h = first_of(v, mesh)
     while True:
         opposite, backward = following(h), preceding(h)
         corner = corner_angle(h, mesh)
@@ -345,7 +348,7 @@ def windows_of_pseudo_source(
             a1 = min((high if part == 0 else high_too) - start, corner)
             if a1 > a0:
                 window_from_corner(h, a0, a1, corner, sigma, v, bound, mesh, labels, windows, queue, goal)
-        h = mesh.twin[backward]
+        h = twin_of(backward, mesh)
         if h < 0 or h == mesh.first[v]:
             break
 

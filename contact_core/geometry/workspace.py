@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import FloatArray, IntArray, sparse_zeros
 from contact_core.geometry.kernel_arrays import Labels, Queue, Targets, Windows
 from contact_core.geometry.mesh import TriangleMesh
 
@@ -25,15 +25,13 @@ class Workspace:
     """
 
     def __init__(self, point_count: int, face_count: int) -> None:
-        reach, leg = np.zeros((point_count, 2)), np.zeros((point_count, 3))
-        origin = np.zeros((point_count, 4), np.int64)
-        self.labels = Labels(0.0, reach, leg, origin)
-        self._occupied: FloatArray = np.zeros((3 * face_count, 6))
-        self._waiting: FloatArray = np.zeros((face_count, 2))
-        arrays: tuple[Any, ...] = (reach, leg, origin, self._occupied, self._waiting)
-        if sum(array.nbytes for array in arrays) <= TOUCHED:
-            for array in arrays:
+        sizes = (point_count, 2), (point_count, 3), (point_count, 4), (3 * face_count, 6), (face_count, 2)
+        touched = 8 * sum(rows * columns for rows, columns in sizes) <= TOUCHED
+        reach, leg, origin, self._occupied, self._waiting = map(np.empty if touched else sparse_zeros, sizes)
+        if touched:
+            for array in (reach, leg, origin, self._occupied, self._waiting):
                 array.fill(0)
+        self.labels = Labels(0.0, reach, leg, origin.view(np.int64))
         self._state: IntArray = np.zeros(7, np.int64)
         self.reserve(4096)
 
