@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba.core import event
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload
@@ -83,6 +84,34 @@ def _fence(context: Any) -> Any:
 @overload(memory_fence)  # not inline="always", which loses the writes before it (numba 0.68)
 def _compiled_memory_fence() -> Any:
     return lambda: _fence()
+
+
+def prefetch(array: Any, index: int) -> None:
+    """In kernels: the number at this index of the memory of a contiguous array will be read soon. In Python nothing
+    is to be done."""
+
+
+@intrinsic
+def _prefetch(context: Any, array: Any, index: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        byte, flag = ir.IntType(8).as_pointer(), ir.IntType(32)
+        instruction = builder.module.declare_intrinsic(
+            "llvm.prefetch", [byte], ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag])
+        )
+        address = builder.bitcast(builder.gep(data, [arguments[1]]), byte)
+        builder.call(instruction, [address, flag(0), flag(3), flag(1)])  # for reading, into all caches, data
+        return context.get_dummy_value()
+
+    return numba.types.void(array, numba.types.int64), generate
+
+
+@overload(prefetch)
+def _compiled_prefetch(array: Any, index: Any) -> Any:
+    def implementation(array: Any, index: Any) -> Any:
+        return _prefetch(array, index)
+
+    return implementation
 
 
 class _Part(CPUDispatcher):  # type: ignore[misc]
