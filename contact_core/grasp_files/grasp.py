@@ -57,13 +57,15 @@ SCHEMA = 1
 
 @dataclass(frozen=True, eq=False)
 class GraspJob:
-    """The two assets in one session. object: in the hand's units, scaled. notes: of what was read."""
+    """The two assets in one session. object: in the hand's units, scaled. notes: of what was read. unit: a sentence
+    on the unit that the object does not say, None where it does."""
 
     session: Session
     hand: Asset
     object: Asset
     words: tuple[HandWords, ...] = ()
     notes: list[str] = field(default_factory=list)
+    unit: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,10 @@ def grasp(
         return write_results(job, scene, found, out, plugins, seconds, settings, progress)
     except Cancelled as cancelled:
         raise Cancelled("the search for grasps was cancelled; nothing was written.") from cancelled
+    except InvalidInput as error:
+        if job.unit is None:
+            raise
+        raise InvalidInput(f"{error} {job.unit}") from error
 
 
 def prepare(hand: str, thing: str, scale: float, plugins: PluginManager) -> GraspJob:
@@ -130,9 +136,11 @@ def prepare(hand: str, thing: str, scale: float, plugins: PluginManager) -> Gras
     words = tuple(HandWords(**each) for each in manipulator.details.get("hands", ()))
     notes = [f"{asset.name}: {note}" for asset in (manipulator, raw) for note in asset.notes]
     notes += [] if ground is None else [ground]
+    unsaid = None
     if raw.meters_per_unit is None:
-        notes.append(f"{raw.name} says no unit; the hand's was taken. Give --scale where it has another size.")
-    return GraspJob(session, manipulator, placed, words, notes)
+        unsaid = f"{raw.name} says no unit; the hand's was taken. Give --scale where it has another size."
+        notes.append(unsaid)
+    return GraspJob(session, manipulator, placed, words, notes, unsaid)
 
 
 def _names(place: int) -> dict[str, str]:

@@ -41,8 +41,7 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
     approaches, closed, value, seen = screened(scene, settings, progress.part(0.02, 0.3))
     order = chosen(scene.hand, approaches, value, seen, max(MOST_TRIED * settings.count, LEAST_TRIED))
     if not len(order):
-        what = f"for a {' or '.join(settings.kinds)} grasp " if settings.kinds else ""
-        raise InvalidInput(f"the hand found no place {what}at which it touches the object. {remark_on_size(scene)}")
+        raise _no_place(scene, settings)
     score = scene.plugins.make(GRASP_SCORES, scene.plugins.name_for(GRASP_SCORES, "grasp", settings.score))
     given, poor = list[Suggestion](), list[Suggestion]()
     for place, n in enumerate(order):
@@ -59,8 +58,15 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
         else:
             poor.append(one)
     poor.sort(key=lambda one: -one.score)
+    if not given and not poor:
+        raise _no_place(scene, settings)
     yield from poor[: max(settings.count - len(given), 0)]
     progress.tell(1.0, "Done")
+
+
+def _no_place(scene: GraspScene, settings: GraspSettings) -> InvalidInput:
+    what = f"for a {' or '.join(settings.kinds)} grasp " if settings.kinds else ""
+    return InvalidInput(f"the hand found no place {what}at which it touches the object. {remark_on_size(scene)}")
 
 
 def _check(scene: GraspScene, settings: GraspSettings, at: FloatArray | None) -> None:

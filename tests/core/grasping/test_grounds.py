@@ -59,6 +59,17 @@ def test_other_things_are_no_grounds(parts: tuple[solids.Solid, ...]) -> None:
     assert without_grounds(asset, 0.19) == (asset, None)
 
 
+def test_what_lies_far_away_is_left_out_and_counted() -> None:
+    points, faces = solids.box(0.01, 0.01, 0.01)
+    near, far = (points + 1.0, faces), (points + 2000.0, faces)
+    rest, note = without_grounds(scene(far, PROP, near), 0.19)
+    assert (
+        len(rest.mesh.faces) == len(PROP[1]) + len(faces) and np.ptp(rest.mesh.points[rest.mesh.used_points]) < 2.0
+    )
+    assert note is not None and note.startswith("1 parts")
+    assert without_grounds(scene((points + 100.0, faces), PROP), 0.19)[1] is None  # within a grid of distances
+
+
 def written(folder: Path, *parts: solids.Solid) -> Path:
     path, mesh = folder / "scene.obj", scene(*parts).mesh
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.points.tolist()]
@@ -81,3 +92,14 @@ def test_a_hand_that_touches_nothing_is_told_so(tmp_path: Path, capsys: pytest.C
     path = written(tmp_path, ground(40.0))
     assert main(["grasp", "sample:human_hand", str(path), "--count", "1", "--out", str(tmp_path / "out")]) == 2
     assert "found no place" in capsys.readouterr().err
+
+
+def test_where_no_grasp_comes_of_any_place_that_is_told_with_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As with a part in millimetres that is read as metres, on which every closed hand is lost when it is solved."""
+    monkeypatch.setattr("contact_core.grasping.suggest._finished", lambda *_: None)
+    path = written(tmp_path, solids.box(60.0, 80.0, 100.0))
+    assert main(["grasp", "sample:human_hand", str(path), "--count", "1", "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert "found no place" in told and "is its scale right?" in told and "--scale" in told
