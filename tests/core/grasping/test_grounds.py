@@ -97,7 +97,7 @@ def test_a_hand_that_touches_nothing_is_told_so(tmp_path: Path, capsys: pytest.C
 def test_where_no_grasp_comes_of_any_place_that_is_told_with_what_to_do(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As with a part in millimetres that is read as metres, on which every closed hand is lost when it is solved."""
+    """As with a part in millimetres read as metres, on which every closed hand is lost when it is solved."""
     monkeypatch.setattr("contact_core.grasping.suggest._finished", lambda *_: None)
     path = written(tmp_path, solids.box(60.0, 80.0, 100.0))
     assert main(["grasp", "sample:human_hand", str(path), "--count", "1", "--out", str(tmp_path / "out")]) == 2
