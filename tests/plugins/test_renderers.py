@@ -195,3 +195,25 @@ def test_refusals(tmp_path: Path) -> None:
         SoftwareRenderer().render(
             [Picture((PictureMesh(icosphere(1), RED),))], tmp_path / "taken" / "p.png", size=(32, 32)
         )
+
+
+@pytest.mark.parametrize("turn", range(3))
+def test_a_triangle_that_reaches_behind_the_eye_is_drawn_like_its_small_parts(turn: int) -> None:
+    """A ground of two triangles, and the same in small squares, most of which lie before or behind the eye."""
+
+    def ground(parts: int) -> PictureMesh:
+        u, v = np.meshgrid(np.linspace(-1, 1, parts + 1), np.linspace(-1, 1, parts + 1), indexing="ij")
+        points = np.stack([40 * u.ravel(), np.full(u.size, -1.0), 40 * v.ravel()], axis=1)
+        corner = np.arange(u.size).reshape(u.shape)[:-1, :-1].ravel()
+        squares = np.c_[corner, corner + 1, corner + parts + 2, corner, corner + parts + 2, corner + parts + 1]
+        colors = 0.5 + 0.5 * np.stack([u.ravel(), v.ravel(), 0 * u.ravel()], axis=1)
+        faces = np.roll(squares.reshape(-1, 3), turn, axis=1)
+        return PictureMesh(TriangleMesh(points, faces), (1.0, 1.0, 1.0), vertex_colors=colors)
+
+    images = [
+        draw(Picture((ground(parts),), camera_from=(0.3, 0.6, 1.0), focus=icosphere(1).points), SIZE).astype(float)
+        for parts in (1, 64)
+    ]
+    apart = np.abs(images[0] - images[1]).max(axis=2)
+    assert (apart <= 2).mean() > 0.98
+    assert (apart[-1] <= 2).all()  # the row that is nearest to the eye shows the ground

@@ -23,7 +23,7 @@ OVERSAMPLE = 2
 _KEY_LIGHT = np.array([-0.45, 0.65, 0.75]) / np.linalg.norm([-0.45, 0.65, 0.75])  # camera axes
 _TOP, _BOTTOM = np.array([0.97, 0.97, 0.98]), np.array([0.84, 0.86, 0.89])  # background
 _INK, _ALARM = np.array([0.13, 0.15, 0.19]), np.array([0.78, 0.10, 0.10])
-NEAR = 0.02  # of the distance from eye to centre: what is nearer is not drawn
+NEAR = 0.02  # of the distance from eye to centre: what is nearer is cut off
 _CHUNK = 4_000_000  # fragments drawn at a time
 
 
@@ -83,36 +83,37 @@ class _Canvas:
         self.depth: FloatArray = np.full(height * width, np.inf)
         self.focal = 0.5 * height / np.tan(camera.field_of_view / 2)
 
-    def project(self, points: FloatArray) -> FloatArray:
-        """(n, 3) pixel x, pixel y and depth of world points (n, 3)."""
-        seen = (points - self.camera.eye) @ self.camera.camera_from_world.T
-        depth = np.maximum(-seen[:, 2], 1e-9)
-        x = 0.5 * self.width + self.focal * seen[:, 0] / depth
-        y = 0.5 * self.height * (1.0 + self.camera.drop) - self.focal * seen[:, 1] / depth
-        return np.stack([x, y, depth], axis=1)
+    def from_eye(self, points: FloatArray) -> FloatArray:
+        """World points (n, 3) from the eye, along the camera's axes; it looks along -z."""
+        return (points - self.camera.eye) @ self.camera.camera_from_world.T
+
+    def on_screen(self, from_eye: FloatArray) -> FloatArray:
+        """(..., 3) pixel x, pixel y and depth of points that `from_eye` gave."""
+        depth = np.maximum(-from_eye[..., 2], 1e-9)
+        x = 0.5 * self.width + self.focal * from_eye[..., 0] / depth
+        y = 0.5 * self.height * (1.0 + self.camera.drop) - self.focal * from_eye[..., 1] / depth
+        return np.stack([x, y, depth], axis=-1)
 
     def mesh(self, item: PictureMesh) -> None:
         """Shaded triangles; a transparent mesh is drawn on a checker of pixels (screen-door)."""
-        projected = self.project(item.mesh.points)
+        from_eye = self.from_eye(item.mesh.points)
         shade = _shade(item.mesh.vertex_normals @ self.camera.camera_from_world.T)  # (n,)
         base = np.asarray(item.color) if item.vertex_colors is None else item.vertex_colors
-        colors = np.clip(np.broadcast_to(base, projected.shape) * shade[:, None], 0, 1)  # (n, 3)
+        colors = np.clip(np.broadcast_to(base, from_eye.shape) * shade[:, None], 0, 1)  # (n, 3)
         frame = np.array([self.width, self.height])
-        in_front = (
-            projected[item.mesh.faces, 2] > NEAR * np.linalg.norm(self.camera.eye - self.camera.centre)
-        ).all(axis=1)
-        faces = item.mesh.faces[in_front]
-        corners = projected[faces]  # (m, 3, 3)
+        near = NEAR * float(np.linalg.norm(self.camera.eye - self.camera.centre))
+        in_front, tints = _cut_in_front(from_eye[item.mesh.faces], colors[item.mesh.faces], near)
+        corners = self.on_screen(in_front)  # (m, 3, 3)
         low = np.floor(np.clip(corners[:, :, :2].min(axis=1), 0, frame)).astype(np.int64)  # (m, 2), in the frame
         span = np.ceil(np.clip(corners[:, :, :2].max(axis=1), 0, frame)).astype(np.int64) - low  # (m, 2)
         seen = (span > 0).all(axis=1)
-        faces, corners, low, span = faces[seen], corners[seen], low[seen], span[seen]
+        tints, corners, low, span = tints[seen], corners[seen], low[seen], span[seen]
         side = 1 << np.ceil(np.log2(np.clip(span.max(axis=1), 1, 8192))).astype(np.int64)  # (m,)
         for extent in np.unique(side):  # triangles of one size class share one grid of pixel offsets
             members = np.flatnonzero(side == extent)
             for start in range(0, len(members), max(1, _CHUNK // int(extent) ** 2)):
                 chosen = members[start : start + max(1, _CHUNK // int(extent) ** 2)]
-                self._triangles(corners[chosen], colors[faces[chosen]], low[chosen], int(extent), item.opacity)
+                self._triangles(corners[chosen], tints[chosen], low[chosen], int(extent), item.opacity)
 
     def _triangles(
         self, corners: FloatArray, colors: FloatArray, low: IntArray, extent: int, opacity: float
@@ -141,7 +142,7 @@ class _Canvas:
         """Round dots, pulled a little towards the eye so that they show on the surface that carries them."""
         if not len(points):
             return
-        projected = self.project(points)
+        projected = self.on_screen(self.from_eye(points))
         reach = np.arange(-radius, radius + 1)
         offset = np.stack(np.meshgrid(reach, reach), -1).reshape(-1, 2)
         offset = offset[(offset**2).sum(axis=1) <= radius * radius]  # (o, 2)
@@ -153,7 +154,7 @@ class _Canvas:
         """Lines (k, 2, 3) as rows of dots."""
         if not len(segments):
             return
-        ends = self.project(segments.reshape(-1, 3)).reshape(-1, 2, 3)
+        ends = self.on_screen(self.from_eye(segments.reshape(-1, 3))).reshape(-1, 2, 3)
         count = int(np.clip(np.abs(ends[:, 1, :2] - ends[:, 0, :2]).max(), 2, 4096))
         t = np.linspace(0, 1, count)[:, None]
         self.discs((segments[:, :1] * (1 - t) + segments[:, 1:] * t).reshape(-1, 3), color, radius)
@@ -166,6 +167,28 @@ class _Canvas:
         np.minimum.at(self.depth, index, depth)
         nearest = depth <= self.depth[index]
         self.image.reshape(-1, 3)[index[nearest]] = colors[nearest]
+
+
+def _cut_in_front(corners: FloatArray, colors: FloatArray, near: float) -> tuple[FloatArray, FloatArray]:
+    """Triangles (m, 3, 3) from the eye, and colours (m, 3, 3) at their corners, cut at the plane z = -near; what is
+    nearer is gone. Sutherland and Hodgman 1974, for one plane."""
+    whole = np.concatenate([corners, colors], axis=-1)  # (m, 3, 6)
+    ahead = corners[:, :, 2] < -near
+    kept = [whole[ahead.all(axis=1)]]
+    for count in (1, 2):
+        some = ahead.sum(axis=1) == count
+        alone = np.argmax(ahead[some] == (count == 1), axis=1)  # the corner that is on its own side
+        a, b, c = (np.take_along_axis(whole[some], (alone[:, None, None] + k) % 3, axis=1)[:, 0] for k in range(3))
+        ab, ac = _where_cut(a, b, near), _where_cut(a, c, near)
+        kept += [np.stack([a, ab, ac], 1)] if count == 1 else [np.stack([ab, b, c], 1), np.stack([ab, c, ac], 1)]
+    cut = np.concatenate(kept)
+    return cut[:, :, :3], cut[:, :, 3:]
+
+
+def _where_cut(a: FloatArray, b: FloatArray, near: float) -> FloatArray:
+    """(k, 6) where edges from a to b (k, 6) meet the plane z = -near."""
+    t = (-near - a[:, 2]) / (b[:, 2] - a[:, 2])
+    return a + t[:, None] * (b - a)
 
 
 def _shade(normals: FloatArray) -> FloatArray:
