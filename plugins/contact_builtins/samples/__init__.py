@@ -1,1 +1,1 @@
-"""Samples that the project makes itself: manipulators and objects, deterministic, cached, watertight."""
+"""Samples that the project makes itself: manipulators and objects, deterministic, watertight."""
