@@ -27,7 +27,7 @@ from contact_core.geometry.flat_faces import mollify
 from contact_core.geometry.kernel_arrays import Halfedges, plain
 from contact_core.geometry.mesh import TriangleMesh
 
-VISITED_AT_ONCE = 1_400_000  # faces: of a larger mesh records are written where queries come
+VISITED_AT_ONCE = 350_000  # faces: of a larger mesh records are written where queries come
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from contact_core.geometry.kernel_arrays import Labels, Queue, Targets, Windows
 from contact_core.geometry.mesh import TriangleMesh
 
 _POPS = 4  # queue_kernels.POPS; importing that would import numba
-TOUCHED = 2**28  # bytes: 1.4 million faces
+TOUCHED = 2**26  # bytes: 350,000 faces
 
 
 class Workspace:
