@@ -23,6 +23,7 @@ from contact_core.edit.command import apply_command
 from contact_core.errors import Cancelled, ContactError, InvalidInput
 from contact_core.geometry.transform import transform_points
 from contact_core.grasp_files.grounds import without_grounds
+from contact_core.grasp_files.views import views
 from contact_core.grasping.finishing import Suggestion
 from contact_core.grasping.pads import remark_on_size
 from contact_core.grasping.scene import GraspScene
@@ -200,24 +201,25 @@ def sheet(scene: GraspScene, found: Sequence[Suggestion]) -> list[Picture]:
     """Every grasp from two sides, one below the other, so many in a row as fit."""
     pictures = []
     for place, one in enumerate(found):
-        for side in (0, 1):
+        seen = np.concatenate([one.skin.points[np.concatenate(scene.hand.skin_of_digits)], _palm(scene, one)])
+        for side, eye in enumerate(views(scene.mesh, seen, one.way, scene.hand.length)):
             row = 2 * (place // COLUMNS) + side
-            pictures.append(_picture(scene, one, place + 1, side, row))
+            pictures.append(_picture(scene, one, place + 1, side, row, seen, eye))
     return sorted(pictures, key=lambda picture: picture.row)
 
 
-def _picture(scene: GraspScene, one: Suggestion, place: int, side: int, row: int) -> Picture:
-    hand = scene.hand
-    digits = one.skin.points[np.concatenate(hand.skin_of_digits)]
-    palm = transform_points(one.placed, hand.tested) if len(hand.tested) else digits
-    seen = np.concatenate([digits, palm])
-    near = scene.mesh.points[np.linalg.norm(scene.mesh.points - digits.mean(axis=0), axis=1) < NEAR * hand.length]
-    up = np.eye(3)[1]
-    across = np.cross(one.way, up)
-    across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.2 else np.eye(3)[0]
-    lift = np.cross(across, one.way)
-    lift = lift * (1.0 if lift @ up >= 0 else -1.0)
-    eye: FloatArray = across + 0.35 * one.way + 0.25 * lift if side == 0 else -across - 0.45 * one.way + 0.3 * lift
+def _palm(scene: GraspScene, one: Suggestion) -> FloatArray:
+    """(k, 3) points of the palm's skin, in the object's space."""
+    return transform_points(one.placed, scene.hand.tested)
+
+
+def _picture(
+    scene: GraspScene, one: Suggestion, place: int, side: int, row: int, seen: FloatArray, eye: FloatArray
+) -> Picture:
+    """One side of a grasp. seen: (k, 3) what of the hand is in the frame. eye: (3,) from where."""
+    digits = one.skin.points[np.concatenate(scene.hand.skin_of_digits)]
+    away = np.linalg.norm(scene.mesh.points - digits.mean(axis=0), axis=1)
+    near = scene.mesh.points[away < NEAR * scene.hand.length]
     word = "" if one.is_grasp else " - NOT good"
     beside = f"{spell('gap', one.facts.metrics['gap'])} gap {told_through(one.facts.metrics)}".rstrip()
     caption = f"{place}. {one.kind}{word}" if side == 0 else f"   {beside}"

@@ -14,6 +14,10 @@ from contact_core.geometry.surface_point import SurfacePoints
 
 DENSE = 4000  # points on which the surface's shape is judged
 AROUND = 0.16  # hand lengths: how far that shape is looked at
+SPOKES = 16  # ways in which the end of a plate is looked for
+DEEPER = 1.5  # times as deep as it is thick is what ends in a rim; a ball has none
+PARALLEL = 0.6  # - cos of the angle between both sides of what is a plate or a wall
+NEAR_RIM, OUTSIDE = 1.0, 0.35  # hand lengths from a place to the end, and the room that a palm needs there
 INSIDE = 1e-4  # hand lengths that a ray starts below the surface
 
 
@@ -86,6 +90,50 @@ def features_of(
     ahead = locator.cast(here + INSIDE * length * out, out)
     free = np.where(ahead.found, ahead.distance, np.inf)
     return Features(here, out, thickness, opposite, axis, elongation, width, free)
+
+
+@dataclass(frozen=True, eq=False)
+class Rims:
+    """k places at which a plate or a wall ends. points: (k, 3) on the rim, in its middle. across: (k, 3) unit, its
+    normal. inwards: (k, 3) unit, across that, from the rim into the plate. thickness: (k,) of the plate."""
+
+    points: FloatArray
+    across: FloatArray
+    inwards: FloatArray
+    thickness: FloatArray
+
+
+def rims_of(
+    mesh: TriangleMesh, length: float, thickest: float, seed: int, at: FloatArray | None = None, reach: float = 0.3
+) -> Rims:
+    """Where what is thinner than `thickest` ends, with room outside: the nearest end from each of many places that
+    are no farther from it than a hand's `length`, where the thing reaches deeper than it is thick.
+
+    at: (3,) only ends within `reach` hand lengths of it.
+    """
+    dense = surface_samples(mesh, DENSE, seed)
+    here, out = dense.positions(mesh), mesh.face_normals[dense.faces]
+    locator = Locator.of(mesh)
+    hit = locator.cast(here - INSIDE * length * out, -out, max_distance=thickest)
+    opposite = mesh.face_normals[hit.points.faces]
+    flat = np.flatnonzero(hit.found & (np.einsum("ki,ki->k", out, opposite) < -PARALLEL))
+    thickness, out = hit.distance[flat] + INSIDE * length, out[flat]
+    middles = here[flat] - 0.5 * thickness[:, None] * out
+    first = np.cross(out, np.eye(3)[np.abs(out).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    turn = (np.arange(SPOKES) * 2.0 * np.pi / SPOKES)[:, None, None]
+    ways = np.cos(turn) * first + np.sin(turn) * np.cross(out, first)  # (s, k, 3)
+    hit = locator.cast(np.broadcast_to(middles, ways.shape).reshape(-1, 3), ways.reshape(-1, 3))
+    ends = np.where(hit.found, hit.distance, np.inf).reshape(SPOKES, len(flat))
+    near, each = ends.argmin(axis=0), np.arange(len(flat))
+    away, way = ends[near, each], ways[near, each]
+    deep = away + ends[(near + SPOKES // 2) % SPOKES, each] > DEEPER * thickness
+    kept = np.flatnonzero((away < NEAR_RIM * length) & deep)
+    rim = middles[kept] + away[kept, None] * way[kept]
+    free = locator.cast(rim + INSIDE * length * way[kept], way[kept], max_distance=OUTSIDE * length)
+    close = np.full(len(rim), True) if at is None else np.linalg.norm(rim - at, axis=1) < reach * length
+    rows = np.flatnonzero(~free.found & close)
+    return Rims(rim[rows], out[kept][rows], -way[kept][rows], thickness[kept][rows])
 
 
 def _thinned(points: FloatArray, count: int, seed: int) -> IntArray:

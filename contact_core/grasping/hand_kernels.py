@@ -244,6 +244,9 @@ def close_best(
                 better = False
             price = look_about(near, step, starts, chains, state, best)
         clear = close_digit(d, base, bar, chains, skin, grid, rules.touch, state)
+        if clear < -rules.touch and curl > 0.0 and d != chains.thumb:  # it was in the object before it closed
+            open_digit(d, 0.0, chains, state)
+            clear = close_digit(d, base, bar, chains, skin, grid, rules.touch, state)
         misfit = misfit_of(d, clear, price, bar, chains, skin, grid, rules, state)
         if misfit < least_misfit - BEST:
             least_misfit, better = misfit, True

@@ -26,7 +26,8 @@ from contact_core.proposals.draft import Draft
 
 MOST_TRIED = 3  # times as many as are wanted are solved at most,
 LEAST_TRIED = 8  # or so many: who wants one good grasp does not care how many others failed
-LIES = 0.02  # hand lengths: a pad of the closed hand that is nearer lies on a bar
+WITH_TIPS = ("precision", "pinch")  # kinds that one pad of each digit makes
+LIES = 0.02  # hand lengths: a pad of the closed hand that is nearer lies on the object
 REACHED = 0.5  # hand lengths: a place to hold that is farther from the object is none of its
 
 
@@ -103,8 +104,8 @@ def _finished(
     start = hand.pose(in_rig, closed.angles[0], closed.turns[0])
     draft.surfaces.set_pose(scene.hand_name, start)
     wanted = _taking_part(scene, approach, pads)
-    if scene.loops and approach.bars[0, 6] > 0.0:
-        wanted = _on_a_bar(scene, closed, wanted)
+    if approach.kinds[0] in WITH_TIPS or (scene.loops and approach.bars[0, 6] > 0.0):
+        wanted = _nearest_of_digits(scene, closed, wanted)
     return finished(scene, draft, wanted, proposed, approach.kinds[0], approach.used(hand)[0], score)
 
 
@@ -127,9 +128,10 @@ def _taking_part(scene: GraspScene, approach: Approaches, pads: tuple[str, ...])
     return tuple(name for name in pads if counts(name))
 
 
-def _on_a_bar(scene: GraspScene, closed: Closed, pads: tuple[str, ...]) -> tuple[str, ...]:
+def _nearest_of_digits(scene: GraspScene, closed: Closed, pads: tuple[str, ...]) -> tuple[str, ...]:
     """Of those pads the nearest of each digit, and what lies on the object as well: a handle is no longer across
-    than one bone, and a finger that goes round it cannot touch it with all."""
+    than one bone, and a finger that goes round it cannot touch it with all; and tips that hold a thick thing do so
+    alone."""
     hand = scene.hand
     owner = {pad.name: int(b) for pad in hand.description.pads for b in np.flatnonzero(hand.joints == pad.joint)}
     away = np.abs(closed.fits[0, :, 0]) / hand.length

@@ -6,7 +6,8 @@ power: the palm on a place that a hand can span, fingers across the local axis; 
 bar alone, from all sides, so that fingers pass through handles and loops, which the body behind them would stop.
 hook: the same with the thumb at rest and the bar below the fingers' first bones.
 precision, pinch: the line between thumb and finger pads, as this hand brings them to face each other at the
-thickness, laid on two opposite places, turned about itself.
+thickness, laid on two opposite places, turned about itself; and over the rims of plates and walls, the palm
+outside.
 lateral: the same with the side of the bent index finger.
 
 Near two loops that are to be held, thumb and fingers go through both (`loops`).
@@ -23,7 +24,7 @@ import numpy as np
 from contact_builtins.grasps.loops import through_handle, through_two
 from contact_builtins.grasps.opposition import SIDEWAYS, Opposition, oppositions
 from contact_core.arrays import FloatArray, IntArray
-from contact_core.grasping.features import Features, features_of
+from contact_core.grasping.features import Features, features_of, rims_of
 from contact_core.grasping.hand import Hand, spread_out
 from contact_core.grasping.slots import Approaches, GraspRequest, Kind, lacks
 from contact_core.settings import HasSettings, setting
@@ -43,6 +44,10 @@ MOVED = 0.3  # hand lengths that an approach may move a body out of an object
 OPPOSITE = 24  # places between whose sides pads are laid,
 IN_BODY = 4  # times as many for a hand whose body is in the way of most
 FITTING = 3  # ways of opposing that are tried at a place
+ON_RIMS = ("precision", "pinch")
+RIMS = 32  # places on rims, at most
+TURNS = np.radians([0.0, -25.0, 25.0, -50.0, 50.0])  # of a hand over a rim, about the line between its pads
+DEPTHS = (0.5, 0.85)  # of how far pads are from the palm: how far they lie from the rim
 RELAXED = 0.3  # of its room: how far a digit that takes no part is bent
 
 
@@ -62,7 +67,7 @@ class Around(HasSettings):
         wanted = [kind for kind in request.kinds if lacks(hand, kind) is None]
         parts = []
         for kind in wanted:
-            made = list(makers[kind](hand, found, kind))
+            made = [*makers[kind](hand, found, kind), *_over_rims(request, kind)]
             if made:
                 joined = Approaches.joined(made)
                 free = joined[_free(request, joined)]
@@ -207,6 +212,42 @@ def _tips(hand: Hand, found: Features, kind: Kind) -> Iterator[Approaches]:
         place = found[np.array([row])]
         for one in _fitting(table, float(place.thickness[0])):
             yield _pinched(hand, place, one, kind)
+
+
+def _over_rims(request: GraspRequest, kind: Kind) -> Iterator[Approaches]:
+    """Thumb and finger pads on both sides of the rims of plates and walls, the palm outside: of a large plate a
+    hand reaches nothing else, and few places that are chosen at random are as near a rim as that."""
+    hand, length = request.hand, request.hand.length
+    table = oppositions(hand, kind) if kind in ON_RIMS else []
+    if not table:
+        return
+    widest = min(max(one.width for one in table), WIDEST[kind] * length)
+    rims = rims_of(request.mesh, length, 0.95 * widest, request.seed, request.at)
+    for row in spread_out(rims.points, RIMS, 0) if len(rims.points) else ():
+        across, inwards = rims.across[row], rims.inwards[row]
+        for one in _fitting(table, float(rims.thickness[row])):
+            ahead = one.middle - hand.description.palm.point
+            own = _square(one.towards, ahead)
+            to = [_square(side * across, _turned(inwards, across, turn)) for side in (1.0, -1.0) for turn in TURNS]
+            turns = np.array(to) @ own.T
+            for depth in DEPTHS:
+                middle = rims.points[row] + depth * one.room * inwards
+                refs, middles = np.tile(one.middle, (len(turns), 1)), np.tile(middle, (len(turns), 1))
+                limits = np.full(len(hand.bones) - 1, RELAXED)
+                limits[list(one.digits)] = 1.0
+                yield _made(hand, kind, turns @ hand.frame, refs, middles, stay=True, curl=one.curl, limits=limits)
+
+
+def _square(line: FloatArray, ahead: FloatArray) -> FloatArray:
+    """(3, 3) columns: a unit line, the way ahead made square to it, and the third."""
+    across = ahead - (ahead @ line) * line
+    across = across / max(float(np.linalg.norm(across)), 1e-12)
+    return np.stack([line, across, np.cross(line, across)], axis=1)
+
+
+def _turned(way: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
+    """A way (3,) across a unit axis, turned about it."""
+    return np.asarray(np.cos(angle) * way + np.sin(angle) * np.cross(axis, way))
 
 
 def _fitting(table: list[Opposition], thick: float) -> list[Opposition]:

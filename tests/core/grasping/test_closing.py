@@ -15,6 +15,7 @@ from contact_core.grasping.hand import Hand, turn_about
 from contact_core.grasping.hand_kernels import between, turned_root
 from contact_core.grasping.screening import thumb_along
 from contact_core.rig.rig import forward_kinematics
+from contact_core.testing import meshes
 from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
 
 N = 24
@@ -91,6 +92,26 @@ def test_a_limit_of_nothing_keeps_a_digit_open() -> None:
     still = slice(int(one.bones[1]), int(one.bones[2]))
     assert np.abs(closed.angles[:, still]).max() < 1e-12
     assert np.abs(closed.angles[:, int(one.bones[2]) : int(one.bones[3])]).max() > 0.1
+
+
+def test_a_finger_that_is_bent_into_the_object_beforehand_closes_from_straight() -> None:
+    one = hand()
+    finger = 1 if one.thumb == 0 else 0
+    last = int(one.bones[finger + 1]) - 1
+    bent = one.frames(
+        np.eye(4)[None],
+        np.where(one.flexes, 0.4 * one.high, 0.0)[None],
+        np.tile(np.eye(3), (1, len(one.bones) - 1, 1, 1)),
+    )[0, last]
+    tip = bent[:3, :3] @ one.capsules[last, 1] + bent[:3, 3]
+    ball = meshes.icosphere(2)
+    mesh = TriangleMesh(ball.points * 0.08 * one.length + tip, ball.faces)
+    field = DistanceField.of(mesh, resolution=40)
+    straight, began = (
+        close_hands(one, field, np.eye(4)[None], np.zeros((1, 3)), curls=np.array([curl])) for curl in (0.0, 0.4)
+    )
+    assert straight.clear[0, finger] > -0.01 * one.length, "from straight it finds the ball from outside"
+    assert began.clear[0, finger] > -0.01 * one.length
 
 
 def test_fingers_keep_out_of_one_another() -> None:
