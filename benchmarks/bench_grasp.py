@@ -21,6 +21,7 @@ import numpy as np
 from contact_core.errors import ContactError
 from contact_core.grasp_files.grasp import HAND, OBJECT, prepare, sheet
 from contact_core.grasping.searching import GraspSettings
+from contact_core.grasping.suggest import ranked
 from contact_core.grasping.suggest import suggest as suggested
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.plugins.manager import PluginManager
@@ -120,7 +121,7 @@ def one(hand: str, thing: str, count: int, plugins: PluginManager, sheets: Path 
     except ContactError as error:
         return Cell(False, 0, 0, 0.0, 0.0, f"refused: {error}")
     used = time.process_time() - began
-    grasps.sort(key=lambda grasp: -grasp.score)
+    grasps = ranked(grasps)
     if sheets is not None and grasps:
         sheets.mkdir(parents=True, exist_ok=True)
         pictures = sheet(scene, grasps)

@@ -28,7 +28,7 @@ from contact_core.grasping.finishing import Suggestion
 from contact_core.grasping.pads import remark_on_size
 from contact_core.grasping.scene import GraspScene
 from contact_core.grasping.searching import GraspSettings
-from contact_core.grasping.suggest import suggest
+from contact_core.grasping.suggest import ranked, suggest
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.grasping.verdict import DEFINITIONS, spell, told_through
 from contact_core.hands.description import HandWords
@@ -106,7 +106,7 @@ def grasp(
         for one in suggest(scene, settings, part) if like is None else suggest_like(scene, *like, settings, part):
             first = first or time.perf_counter() - began
             found.append(one)
-        found.sort(key=lambda one: -one.score)
+        found = ranked(found)
         seconds = {"first": round(first, 2), "all": round(time.perf_counter() - began, 2)}
         return write_results(job, scene, found, out, plugins, seconds, settings, progress)
     except Cancelled as cancelled:

@@ -6,7 +6,7 @@ and self-collision, contacts settle, and the result is measured as any job's is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +68,11 @@ def suggest(scene: GraspScene, settings: GraspSettings, progress: Progress = NO_
 def _no_place(scene: GraspScene, settings: GraspSettings) -> InvalidInput:
     what = f"for a {' or '.join(settings.kinds)} grasp " if settings.kinds else ""
     return InvalidInput(f"the hand found no place {what}at which it touches the object. {remark_on_size(scene)}")
+
+
+def ranked(found: Iterable[Suggestion]) -> list[Suggestion]:
+    """Those that pass first, however well others score, and the best of each first."""
+    return sorted(found, key=lambda one: (not one.is_grasp, -one.score))
 
 
 def _check(scene: GraspScene, settings: GraspSettings, at: FloatArray | None) -> None:

@@ -21,7 +21,7 @@ from contact_core.grasping.loops import digits_through, loops_near
 from contact_core.grasping.pads import remark_on_size
 from contact_core.grasping.searching import GraspSettings
 from contact_core.grasping.slots import lacks
-from contact_core.grasping.suggest import suggest
+from contact_core.grasping.suggest import ranked, suggest
 from contact_core.grasping.verbs import grasp_scene
 from contact_core.plugins.manager import PluginManager
 from contact_core.progress import CallbackProgress
@@ -51,6 +51,13 @@ def test_grasps_pass_and_are_accepted_as_one_step(session: Session, found: list[
     session.undo()
     assert session.document == before or session.document.pairs == before.pairs
     assert session.revision == revision or not session.document.pairs
+
+
+def test_what_fails_ranks_below_what_passes_however_well_it_scores(found: list[Suggestion]) -> None:
+    good, better = found
+    bad = replace(better, score=good.score + 9.0, verdict=replace(good.verdict, failures=("it slips.",)))
+    worse = replace(bad, score=good.score - 1.0)
+    assert ranked([worse, bad, good]) == [good, bad, worse]
 
 
 def test_a_grasp_is_no_other(found: list[Suggestion]) -> None:
