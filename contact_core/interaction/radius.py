@@ -9,26 +9,26 @@ from contact_core.interaction.tool import Gesture
 from contact_core.plugins.registry import TOOLS
 
 if TYPE_CHECKING:
-    from contact_core.interaction.interaction import Interaction
+    from contact_core.interaction.holding import Holding
 
 
 class RadiusGesture(Gesture):
     """The radius of the brush by moving the pointer, without a button: twice as large every 120 pixels."""
 
-    def __init__(self, interaction: Interaction) -> None:
-        self._interaction = interaction
-        self._before = getattr(interaction.desk.tool(interaction.tool), "radius", None)
+    def __init__(self, holding: Holding) -> None:
+        self._holding = holding
+        self._before = getattr(holding.desk.tool(holding.tool), "radius", None)
         self._start: Pointer | None = None
-        interaction.resize(1.0)  # refuses a tool that has no radius
+        holding.resize(1.0)  # refuses a tool that has no radius
 
     def move(self, pointer: Pointer) -> None:
         self._start = self._start or pointer
-        doublings = (pointer.x - self._start.x) / (120.0 * self._interaction.desk.view.pixel_ratio)
+        doublings = (pointer.x - self._start.x) / (120.0 * self._holding.desk.view.pixel_ratio)
         self.cancel()
-        self._interaction.resize(2.0 ** min(max(doublings, -6.0), 6.0))
+        self._holding.resize(2.0 ** min(max(doublings, -6.0), 6.0))
 
     def cancel(self) -> None:
-        self._interaction.configure(TOOLS, self._interaction.tool, radius=self._before)
+        self._holding.configure(TOOLS, self._holding.tool, radius=self._before)
 
     def hint(self) -> str:
         return "move to set the radius, click to keep it"
