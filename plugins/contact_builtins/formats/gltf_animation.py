@@ -8,18 +8,16 @@ before frame 0 is shifted; `extras` say the rate, and the frame at time 0.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from contact_builtins.formats.glb_scene import GlbScene
 from contact_core.arrays import FloatArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.rig.clip import Clip
 from contact_core.rig.pose_keys import PoseCurves, PoseKeys
-
-if TYPE_CHECKING:
-    from contact_builtins.formats.gltf_writer import GlbScene
 
 ALIKE = 1e-7  # up to which a channel stands still
 
