@@ -21,7 +21,8 @@ class GalleryCommand:
 
     def run(self, arguments: argparse.Namespace) -> int:
         from contact_core.errors import InvalidInput
-        from contact_gallery.exhibition import exhibit, figure, names
+        from contact_gallery.exhibition import exhibit
+        from contact_gallery.figure import figure, names
 
         if arguments.list:
             titles = {name: figure(name).title for name in names()}

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
 import json
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,38 +16,12 @@ from contact_core.plugins.registry import RENDERERS
 from contact_core.plugins.slots import Renderer
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.solve.warm_up import warm_up
-from contact_gallery.figures import ORDER
+from contact_gallery.figure import Figure, figure, names
 from contact_gallery.page import page
 from contact_gallery.sheet import Row, Sheet
 
 WIDTH, TALLEST = 1200, 0.38  # pixels of a row, and its height at most, of its width
 QUALITY = 88  # of JPEG
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure: its title and text, what of the paper it is, and what draws it."""
-
-    name: str
-    title: str
-    text: str
-    paper: str
-    draw: Callable[[Sheet], None]
-    source: str
-
-
-def names() -> tuple[str, ...]:
-    """The names of all figures, in the paper's order."""
-    return ORDER
-
-
-def figure(name: str) -> Figure:
-    """A figure by name. Raises InvalidInput naming those that exist."""
-    if name not in ORDER:
-        raise InvalidInput(f"there is no figure {name!r}; there are {', '.join(ORDER)}.")
-    module = importlib.import_module(f"contact_gallery.figures.{name}")
-    title, _, text = inspect.cleandoc(module.__doc__ or "").partition("\n")
-    return Figure(name, title.rstrip("."), text.strip(), module.PAPER, module.draw, inspect.getsource(module))
 
 
 def exhibit(
@@ -73,7 +45,7 @@ def exhibit(
         part.tell(0.0, one.title)
         made.append(_make(one, out / "gallery", plugins, part, width))
     known = [
-        (figure(name), kept) for name in ORDER if (kept := _kept(out / "gallery" / f"{name}.json")) is not None
+        (figure(name), kept) for name in names() if (kept := _kept(out / "gallery" / f"{name}.json")) is not None
     ]
     write_atomic(out / "gallery.md", page(known))
     return made

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from contact_gallery.exhibition import Figure
+from contact_gallery.figure import Figure
 
 HEAD = """# Gallery
 

@@ -13,7 +13,8 @@ import contact_core as contact
 from contact_core.cli import main
 from contact_core.edit.operation_log import OperationLog
 from contact_core.plugins.manager import PluginManager
-from contact_gallery.exhibition import exhibit, figure, names
+from contact_gallery.exhibition import exhibit
+from contact_gallery.figure import figure, names
 from contact_gallery.page import page
 
 FAST = ("geodesics", "parameterisation", "sampling", "contact_models", "bulk_transfer")
