@@ -18,6 +18,7 @@ from contact_core.document.document import ContactDocument
 from contact_core.edit.document_geometry import DocumentGeometry
 from contact_core.edit.draft import DocumentDraft
 from contact_core.edit.editor import Editor
+from contact_core.edit.verbs.proxying import give_proxy
 from contact_core.errors import InvalidInput, MissingExtra, NotManifold, Unreached
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.topology import Topology
@@ -71,12 +72,10 @@ class VerbGroup:
         return isinstance(error, Unreached) or not Topology.of(self._geometry.mesh(surface)).is_manifold
 
     def _on_proxies(self, surfaces: list[str], act: Callable[[Self], T], error: InvalidInput) -> T:
-        from contact_core.edit.verbs.surfaces import Surfaces
-
         draft = DocumentDraft.of(self._editor)
         try:
             for surface in surfaces:
-                Surfaces(draft).add_proxy(surface)
+                give_proxy(draft, surface)
             result = act(type(self)(draft))
         except MissingExtra as missing:
             raise type(error)(f"{error} {missing}") from error

@@ -19,7 +19,8 @@ from contact_core.edit.commands import (
     SetPose,
 )
 from contact_core.edit.verbs.group import VerbGroup
-from contact_core.edit.verbs.rebinding import RebindReport, placed_tracks, plan_rebind
+from contact_core.edit.verbs.proxying import carry, give_proxy
+from contact_core.edit.verbs.rebinding import RebindReport, placed_tracks
 from contact_core.errors import InvalidInput
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.topology import closed_manifold
@@ -113,7 +114,7 @@ class Surfaces(VerbGroup):
             proxy, carrier = self._remade(known.proxy, mesh)
             changed = replace(changed, proxy=proxy)
         self._editor.derived.bring(mesh)
-        return self._carry_by(changed, carrier)
+        return carry(self._editor, changed, carrier)
 
     def add_proxy(
         self,
@@ -130,19 +131,18 @@ class Surfaces(VerbGroup):
         None is the default. mesh: a proxy of one's own instead, near the mesh. A surface that has one gets another.
         Raises InvalidInput for a mesh that is no closed manifold, MissingExtra, Cancelled.
         """
-        record, source = self._document.surface(surface), self._editor.geometry.mesh(surface)
-        if mesh is not None:
-            proxy, carrier = Proxy("", FrozenMap(), mesh.digest, len(mesh.faces)), closed_manifold(mesh, surface)
-        else:
-            proxy, carrier = self._editor.makers.proxy(source, maker, settings, progress)
-        return self._carry_by(replace(record, proxy=proxy), carrier)
+        if mesh is None:
+            return give_proxy(self._editor, surface, maker, settings, progress)
+        proxy = Proxy("", FrozenMap(), mesh.digest, len(mesh.faces))
+        record = replace(self._document.surface(surface), proxy=proxy)
+        return carry(self._editor, record, closed_manifold(mesh, surface))
 
     def remove_proxy(self, surface: str) -> RebindReport:
         """Have the contacts of a surface run on its own mesh again, and say how far they moved."""
         record = self._document.surface(surface)
         if record.proxy is None:
             raise InvalidInput(f"{surface!r} has no proxy.")
-        return self._carry_by(replace(record, proxy=None), self._editor.geometry.mesh(surface))
+        return carry(self._editor, replace(record, proxy=None), self._editor.geometry.mesh(surface))
 
     def know_proxy(self, surface: str, mesh: TriangleMesh) -> None:
         """Bring the proxy mesh that the document names for a surface. Raises InvalidInput for any other."""
@@ -156,13 +156,6 @@ class Surfaces(VerbGroup):
         if not proxy.maker:
             raise InvalidInput("the proxy was brought, and fits the old mesh only: remove it first (remove_proxy).")
         return self._editor.makers.proxy(mesh, proxy.maker, proxy.settings)
-
-    def _carry_by(self, record: Surface, carrier: TriangleMesh) -> RebindReport:
-        """Put the contacts of a surface onto a mesh, which becomes what they run on."""
-        command, report = plan_rebind(self._editor, record, carrier)
-        self._editor.derived.bring(carrier)
-        self._editor.do(command)
-        return report
 
     def rename(self, surface: str, name: str) -> None:
         """Give a surface another name, everywhere."""
