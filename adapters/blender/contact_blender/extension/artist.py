@@ -12,7 +12,7 @@ from typing import Any
 
 import bpy
 
-from contact_blender.extension import drawn, film, settings, where
+from contact_blender.extension import drawn, frames, settings, where
 from contact_blender.extension.region_view import RegionView
 from contact_core.edit.listeners import DocumentChanged
 from contact_core.interaction.events import Pointer
@@ -79,7 +79,7 @@ class Artist:
         if self.interaction.is_busy or (patient and now - self._looked < _LOOKS):
             return
         self._looked = now
-        film.follow_frame(self.session)
+        frames.follow_frame(self.session)
         desk = self.interaction.desk
         bound = self.session.binding.surfaces
         desk.hidden = frozenset(name for name, found in bound.items() if not self.host.is_seen(found.object_id))

@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from contact_blender.extension import film, shared
+from contact_blender.extension import frames, shared
 
 # The modes in which a step of Blender's undo holds the whole scene (`undo.WHOLE_SCENE`).
 MODES = frozenset(("OBJECT", "POSE", "SCULPT", "PAINT_WEIGHT", "PAINT_VERTEX"))
@@ -111,7 +111,7 @@ def _run(self: Any, context: Any, action: Action, by_blender: bool = False) -> s
 
     try:
         session = shared.session()
-        film.follow_frame(session)
+        frames.follow_frame(session)
         with session.host.step_of_operator() if by_blender else contextlib.nullcontext():
             said = action(session, context, self)
     except ContactError as error:

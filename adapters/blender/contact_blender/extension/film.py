@@ -68,23 +68,6 @@ def redraw() -> None:
                 area.tag_redraw()
 
 
-def follow_frame(session: Session) -> None:
-    """The frame that the scene shows is the frame at which edits are keys. No edit itself."""
-    frame = float(bpy.context.scene.frame_current_final)
-    if session.timeline.frame != frame:
-        session.timeline.go(frame)
-
-
-def give_range(session: Session) -> None:
-    """A film without a range takes that of the scene, with its rate. Part of a macro."""
-    from fractions import Fraction
-
-    film, scene = session.timeline, bpy.context.scene
-    if film.settings.first == film.settings.last:
-        base = Fraction(scene.render.fps_base).limit_denominator(1001)
-        film.set(scene.frame_start, scene.frame_end, scene.render.fps / base)
-
-
 def measure(session: Session) -> str:
     """Measure every frame, for the tints of bars and the curves. Raises InvalidInput, Cancelled."""
     from contact_core.interaction.film import drafts_of

@@ -6,7 +6,7 @@ from typing import Any
 
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from contact_blender.extension import film
+from contact_blender.extension import film, frames
 from contact_blender.extension.declaring import operator
 
 PAIR = StringProperty(name="Pair", description="A pair; empty: the active one of the panel")
@@ -50,7 +50,7 @@ def span_add(session: Any, context: Any, given: Any) -> str:
     pair, at = _pair_of(session, context, given.pair), session.timeline.frame
     eases = [None if value < 0.0 else value for value in (given.ease_in, given.ease_out)]
     with session.macro(f"Hold {pair}"):
-        film.give_range(session)
+        frames.give_range(session)
         session.timeline.hold(pair, at, at + given.frames, ease_in=eases[0], ease_out=eases[1], hold=given.hold)
     film.redraw()
     return f"{pair} holds from frame {at:g} to {at + given.frames:g}."
@@ -119,7 +119,7 @@ def span_remove(session: Any, context: Any, given: Any) -> str:
 def film_measure(session: Any, context: Any, given: Any) -> str:
     """Measure the contacts at every frame: the bars of the timeline are green, yellow or red by it."""
     with session.macro("Measure the film"):
-        film.give_range(session)
+        frames.give_range(session)
     return film.measure(session)
 
 
