@@ -145,4 +145,4 @@ def chair() -> Scene:
     above = {name: rig.rest_world[rig.joint_index(name), 1, :3].tolist() for name in ("hips", "chest")}
     upright = tuple(Look("body", name, (0.0, 100.0, 0.0), (x, y, z)) for name, (x, y, z) in above.items())
     terms = (*paper_terms(), PenetrationTerm(), LookTerm(upright))
-    return Scene(PoseProblem(bodies, tuple(contacts), terms), (1.0, 0.35, 0.9))
+    return Scene(PoseProblem(bodies, tuple(contacts), terms=terms), (1.0, 0.35, 0.9))

@@ -16,9 +16,9 @@ from scipy.ndimage import distance_transform_edt
 
 from contact_core.arrays import FloatArray, IntArray
 from contact_core.geometry.distance_field import DistanceField
+from contact_core.solve.bare_problem import BareProblem
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.penetration import PenetrationTerm, Solid
-from contact_core.solve.problem import PoseProblem
 
 REACH = 3.6  # l, a fifth of a hand: what a ball of this radius does not reach is filled
 ABOVE = 0.6  # l: over a contact in a hollow it is hollow
@@ -66,7 +66,7 @@ class KeepOutTerm(PenetrationTerm):
         """The vertices that are given, else some of all."""
         return self.stand_in.get(body.name) or super().samples_of(body)
 
-    def solids_in(self, problem: PoseProblem) -> dict[str, Solid]:
+    def solids_in(self, problem: BareProblem) -> dict[str, Solid]:
         """The solids of the problem with the given fields."""
         solids = super().solids_in(problem)
         for name, given in self.fields.items():
@@ -88,7 +88,7 @@ class KeepOutOfHollowsTerm(PenetrationTerm):
     summary: ClassVar[str] = "skin stays out of what is solid, and of hollows without a contact"
     default_for: ClassVar[str] = ""
 
-    def solids_in(self, problem: PoseProblem) -> dict[str, Solid]:
+    def solids_in(self, problem: BareProblem) -> dict[str, Solid]:
         """The solids of the problem, those without contacts in a hollow filled."""
         solids = super().solids_in(problem)
         for name, solid in solids.items():
@@ -108,7 +108,7 @@ def _kept(open_field: DistanceField, radius: float) -> DistanceField:
     return known[radius]
 
 
-def _lies_in(contact: PairedPoints, problem: PoseProblem, solid: Solid, closed: Solid) -> bool:
+def _lies_in(contact: PairedPoints, problem: BareProblem, solid: Solid, closed: Solid) -> bool:
     """Whether most of a contact's points on an object have air above them that is filled."""
     mesh = problem.bodies[problem.body_index(contact.object)].rig.surface
     points, normals = contact.object_points.positions(mesh), contact.object_points.normals(mesh)

@@ -25,7 +25,8 @@ from contact_core.scene.problem import Objective, world_from_surface
 from contact_core.solve.body import manipulator_length, uniform_scale
 from contact_core.solve.penetration import thinned, thinned_among
 from contact_core.solve.solver import SolveOptions
-from contact_core.solve.terms import PoseTerm, paper_terms
+from contact_core.solve.term import PoseTerm
+from contact_core.solve.terms import paper_terms
 
 if TYPE_CHECKING:
     from contact_core.edit.derived import Derived

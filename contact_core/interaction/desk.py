@@ -21,7 +21,7 @@ from contact_core.interaction.settings import InteractionSettings, Selection
 from contact_core.interaction.view import View, shows
 from contact_core.plugins.registry import TOOLS, Slot
 from contact_core.proposals.draft import Draft
-from contact_core.solve.terms import PoseTerm
+from contact_core.solve.term import PoseTerm
 
 if TYPE_CHECKING:
     from contact_core.edit.stroke import Stroke

@@ -21,7 +21,8 @@ from contact_core.solve.levenberg_marquardt import FIRST_DAMPING, few_steps
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
 from contact_core.solve.stretch import SkinStretchTerm
-from contact_core.solve.terms import PoseTerm, paper_terms
+from contact_core.solve.term import PoseTerm
+from contact_core.solve.terms import paper_terms
 
 if TYPE_CHECKING:
     from contact_core.interaction.desk import Desk

@@ -38,7 +38,8 @@ from contact_core.session import Session
 from contact_core.settings import configured
 from contact_core.settings import settings_of as declared_by
 from contact_core.solve.solver import SolveOptions, SolveStatus
-from contact_core.solve.terms import PoseTerm, paper_terms
+from contact_core.solve.term import PoseTerm
+from contact_core.solve.terms import paper_terms
 
 SOLVE, MOVE, MEASURE = 0.45, 0.55, 0.7  # where these begin, as fractions of the job
 COMMON = tuple(each.name for each in declared_by(SolveOptions))

@@ -48,7 +48,7 @@ class ObjectGaps:
             return moved
         frames, lengths = self._frames(state)
         result = frames[self.bone] @ moved
-        if not state.problem.is_still(self.axes):
+        if not state.layout.is_still(self.axes):
             turned = state.jacobian(self.axes).reshape(-1, 3, 3, moved.shape[2]) / lengths[:, :, None, None]
             result += np.einsum("kaid,ki->kad", turned[self.bone], state.vectors(self.gap))
         return np.asarray(result)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     )  # fmt: skip
     from contact_core.scene.host import HostAdapter
     from contact_core.solve.solver import PoseSolver
-    from contact_core.solve.terms import PoseTerm
+    from contact_core.solve.term import PoseTerm
 
 T_co = TypeVar("T_co", covariant=True)
 
@@ -76,7 +76,7 @@ POSE_SOLVERS: Slot[PoseSolver] = Slot(
     roles=("solve",), first_is="solve",
 )  # fmt: skip
 POSE_TERMS: Slot[type[PoseTerm]] = Slot(
-    "contact_pose_terms", "pose term", "contact_core.solve.terms:PoseTerm", instances=False, roles=("depth",)
+    "contact_pose_terms", "pose term", "contact_core.solve.term:PoseTerm", instances=False, roles=("depth",)
 )
 GEODESIC_ENGINES: Slot[GeodesicEngine] = Slot(
     "contact_geodesic_engines", "geodesic engine", "contact_core.geometry.engine:GeodesicEngine"

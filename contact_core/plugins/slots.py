@@ -2,7 +2,7 @@
 sub-commands.
 
 The protocols of the other slots live with what they serve: `contact.brush.Brush`,
-`contact.axis_generator.AxisGenerator`, `solve.terms.PoseTerm`, `solve.solver.PoseSolver`,
+`contact.axis_generator.AxisGenerator`, `solve.term.PoseTerm`, `solve.solver.PoseSolver`,
 `geometry.engine.GeodesicEngine`, `scene.host.HostAdapter`, `interaction.tool.Tool`.
 """
 

@@ -28,9 +28,10 @@ if TYPE_CHECKING:
     from contact_core.scene.binding import Binding
     from contact_core.scene.problem import Objective
     from contact_core.scene.surfaces import SceneSurfaces
-    from contact_core.solve.problem import Limits, PoseProblem
+    from contact_core.solve.layout import Limits
+    from contact_core.solve.problem import PoseProblem
     from contact_core.solve.solver import SolveOptions
-    from contact_core.solve.terms import PoseTerm
+    from contact_core.solve.term import PoseTerm
 
 
 class ProposingSession(ABC):

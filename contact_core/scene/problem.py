@@ -16,9 +16,11 @@ from contact_core.edit.document_geometry import DocumentGeometry, PairGeometry
 from contact_core.rig.rig import Pose, Rig
 from contact_core.scene.evaluated_rig import EvaluatedRig, HostRig
 from contact_core.solve.body import Body, PairedPoints
-from contact_core.solve.problem import Limits, PoseProblem
+from contact_core.solve.layout import Limits
+from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution
-from contact_core.solve.terms import PoseTerm, paper_terms
+from contact_core.solve.term import PoseTerm
+from contact_core.solve.terms import paper_terms
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,7 @@ def problem_of(
     return PoseProblem(
         tuple(map(body_of, names)),
         tuple(map(contact_of, pairs)),
-        objective.terms,
+        terms=objective.terms,
         free=objective.free,
         held=objective.held,
         prior=objective.prior,

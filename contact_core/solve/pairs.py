@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Rig
 from contact_core.rig.skinning import normal_track, point_track
 from contact_core.rig.track import Track, watched_track
-
-if TYPE_CHECKING:
-    from contact_core.solve.problem import PoseProblem
+from contact_core.solve.layout import DofLayout
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,25 +35,25 @@ class Pairs:
     rows: Mapping[str, slice]
 
 
-def pairs_of(problem: PoseProblem) -> Pairs:
-    """The contact pairs of a problem as tracks.
+def pairs_of(layout: DofLayout, kept_tracks: KeptTracks, kept_ends: KeptEnds) -> Pairs:
+    """The contact pairs of a layout as tracks; what a problem before kept is taken over, what is made is kept.
 
     Weights are divided by the sum over all pairs whatever their gains, so what is on does not change how strong the
     others are. A problem without contacts, or with none that holds, has pairs that cost nothing.
     """
-    if not problem.contacts:
+    if not layout.contacts:
         points, normals = Track.empty(4), Track.empty(3)
         return Pairs(points, points, normals, normals, points, np.zeros(0), np.zeros(0), {})
-    shares = np.concatenate([contact.weights for contact in problem.contacts])
-    gains = np.repeat([c.gain for c in problem.contacts], [len(c.weights) for c in problem.contacts])
+    shares = np.concatenate([contact.weights for contact in layout.contacts])
+    gains = np.repeat([c.gain for c in layout.contacts], [len(c.weights) for c in layout.contacts])
     weights = gains * shares / max(float(shares.sum()), np.finfo(float).tiny)
-    holds = np.repeat([c.hold for c in problem.contacts], [len(c.weights) for c in problem.contacts])
-    ends = np.cumsum([0, *(len(contact.weights) for contact in problem.contacts)])
-    rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(problem.contacts)}
-    manipulators = [(contact.manipulator, contact.manipulator_points) for contact in problem.contacts]
-    objects = [(contact.object, contact.object_points) for contact in problem.contacts]
-    first, first_normals = _tracks(problem, manipulators, as_object=False)
-    second, second_normals = _tracks(problem, objects, as_object=True)
+    holds = np.repeat([c.hold for c in layout.contacts], [len(c.weights) for c in layout.contacts])
+    ends = np.cumsum([0, *(len(contact.weights) for contact in layout.contacts)])
+    rows = {c.name: slice(int(ends[i]), int(ends[i + 1])) for i, c in enumerate(layout.contacts)}
+    manipulators = [(contact.manipulator, contact.manipulator_points) for contact in layout.contacts]
+    objects = [(contact.object, contact.object_points) for contact in layout.contacts]
+    first, first_normals = _tracks(layout, manipulators, kept_tracks, kept_ends, as_object=False)
+    second, second_normals = _tracks(layout, objects, kept_tracks, kept_ends, as_object=True)
     gap = first.combined(second, -1.0)
     return Pairs(first, second, first_normals, second_normals, gap, np.where(holds == "direction", 0.0, weights),
         np.where(holds == "point", 0.0, weights), rows,
@@ -64,34 +61,39 @@ def pairs_of(problem: PoseProblem) -> Pairs:
 
 
 def _tracks(
-    problem: PoseProblem, ends: Sequence[tuple[str, SurfacePoints]], *, as_object: bool
+    layout: DofLayout,
+    ends: Sequence[tuple[str, SurfacePoints]],
+    kept_tracks: KeptTracks,
+    kept_ends: KeptEnds,
+    *,
+    as_object: bool,
 ) -> tuple[Track, Track]:
     """Points and normals of one end of all pairs; an end that is that of a problem before is taken over whole."""
     key = as_object, tuple((name, id(points)) for name, points in ends)
-    if key not in problem.kept_ends:
-        problem.kept_ends[key] = (tuple(ends), *_made_tracks(problem, ends, as_object=as_object))
-    return problem.kept_ends[key][1:]
+    if key not in kept_ends:
+        kept_ends[key] = (tuple(ends), *_made_tracks(layout, ends, kept_tracks, as_object=as_object))
+    return kept_ends[key][1:]
 
 
 def _made_tracks(
-    problem: PoseProblem, ends: Sequence[tuple[str, SurfacePoints]], *, as_object: bool
+    layout: DofLayout, ends: Sequence[tuple[str, SurfacePoints]], kept: KeptTracks, *, as_object: bool
 ) -> tuple[Track, Track]:
     """Points and normals of one end of all pairs; what lies on one body is blended in one go."""
-    owner = np.repeat([problem.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
+    owner = np.repeat([layout.body_index(name) for name, _ in ends], [len(points) for _, points in ends])
     order, tracks, normals = [], [], []
     for index in np.unique(owner):
         rows = np.flatnonzero(owner == index)
-        rig, first = problem.bodies[index].rig, int(problem.bone_offsets[index])
+        rig, first = layout.bodies[index].rig, int(layout.bone_offsets[index])
         order.append(rows)
-        if problem.bodies[index].black_box is not None:
-            total = int(problem.watched_offsets[-1])
-            end = int(problem.watched_offsets[index + 1])
-            start = end - len(rows) if as_object else int(problem.watched_offsets[index])
+        if layout.bodies[index].black_box is not None:
+            total = int(layout.watched_offsets[-1])
+            end = int(layout.watched_offsets[index + 1])
+            start = end - len(rows) if as_object else int(layout.watched_offsets[index])
             tracks.append(watched_track(start, len(rows), total, 4))
             normals.append(watched_track(start, len(rows), total, 3))
             continue
-        mine = [points for name, points in ends if problem.body_index(name) == index]
-        carried, turned = _carried(rig, first, mine, problem.kept_tracks)
+        mine = [points for name, points in ends if layout.body_index(name) == index]
+        carried, turned = _carried(rig, first, mine, kept)
         tracks.append(carried)
         normals.append(turned)
     if len(order) == 1:

@@ -21,13 +21,13 @@ from contact_core.geometry.transform import transform_points
 from contact_core.rig.skinning import joint_track, vertex_track
 from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
+from contact_core.solve.bare_problem import BareProblem
 from contact_core.solve.body import Body, uniform_scale
 from contact_core.solve.state import PoseState
-from contact_core.solve.terms import BoundTerm
+from contact_core.solve.term import BoundTerm
 
 if TYPE_CHECKING:
     from contact_core.geometry.distance_field import DistanceField
-    from contact_core.solve.problem import PoseProblem
 
 Solids = Mapping[str, Sequence[TriangleMesh]]  # closed meshes per rigid body, in the body's surface space
 
@@ -59,7 +59,7 @@ class PenetrationTerm(HasSettings):
     skins: Sequence[str] | None = None
     name: str = field(default="penetration")
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         solids = self.solids_in(problem)
         if not solids:
             raise InvalidInput("the penetration term needs a rigid body to stay out of, but the problem has none.")
@@ -78,7 +78,7 @@ class PenetrationTerm(HasSettings):
         """The vertices (k,) that stand for the skin of a body, and the area (k,) that each stands for."""
         return thinned(body.rig.surface, self.samples)
 
-    def solids_in(self, problem: PoseProblem) -> dict[str, Solid]:
+    def solids_in(self, problem: BareProblem) -> dict[str, Solid]:
         """What is solid, by body."""
         return solids_of(problem, self.solids, self.resolution)
 
@@ -105,7 +105,7 @@ class NoDeeperTerm(HasSettings):
     resolution: int = RESOLUTION
     name: str = field(default="no deeper")
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         skins = []
         for name, (vertices, depths) in self.allowed.items():
             index = problem.body_index(name)
@@ -245,7 +245,7 @@ def _attached(solid: Solid, surface: FloatArray) -> Track:
     return joint_track(np.full(len(surface), solid.bone), transform_points(joint_from_surface, surface))
 
 
-def solids_of(problem: PoseProblem, solids: Solids | None, resolution: int = RESOLUTION) -> dict[str, Solid]:
+def solids_of(problem: BareProblem, solids: Solids | None, resolution: int = RESOLUTION) -> dict[str, Solid]:
     """The solids of a problem by body, their fields built: those given, else the surface of each rigid body.
 
     Raises InvalidInput for solids of what bends.

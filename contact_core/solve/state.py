@@ -7,7 +7,7 @@ product, and an accepted step adds the derivatives.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +16,14 @@ from contact_core.rig.chart import Motion
 from contact_core.rig.skinning import outward_carrier
 from contact_core.rig.track import Gram, Track
 from contact_core.solve.black_box import BlackBoxMotion
-
-if TYPE_CHECKING:
-    from contact_core.solve.problem import PoseProblem
+from contact_core.solve.layout import DofLayout
 
 
 class PoseState:
-    """All bodies of a problem at theta (d,), the values of its free dofs. Read-only for terms."""
+    """All bodies of a layout at theta (d,), the values of its free dofs. Read-only for terms."""
 
-    def __init__(self, problem: PoseProblem, theta: FloatArray) -> None:
-        self.problem = problem
+    def __init__(self, layout: DofLayout, theta: FloatArray) -> None:
+        self.layout = layout
         self.theta: FloatArray = np.array(theta, dtype=np.float64)  # a copy: solvers reuse their buffers
         # By identity; the track is kept beside its vectors so that its id stays its own.
         self._vectors: dict[int, tuple[Track, FloatArray]] = {}
@@ -35,8 +33,8 @@ class PoseState:
 
     @cached_property
     def motions(self) -> tuple[Motion | BlackBoxMotion, ...]:
-        """The motion of every body, in the problem's order."""
-        return self.problem.motions(self.theta)
+        """The motion of every body, in the layout's order."""
+        return self.layout.motions(self.theta)
 
     @cached_property
     def world(self) -> FloatArray:
@@ -45,9 +43,12 @@ class PoseState:
 
     def vectors(self, track: Track) -> FloatArray:
         """(k, 3) what a track carries here: points, or normals that are not normalised."""
-        if self.problem.is_still(track):  # and so the same at every theta
-            return self.problem.still_vectors(track)
-        return self.carried(track)
+        if not self.layout.is_still(track):
+            return self.carried(track)
+        kept = self.layout.still_tracks  # the same at every theta
+        if id(track) not in kept:
+            kept[id(track)] = track, self.carried(track)
+        return kept[id(track)][1]
 
     def carried(self, track: Track) -> FloatArray:
         """(k, 3) the vectors of a track, computed here, whether or not they move."""
@@ -65,12 +66,12 @@ class PoseState:
 
         The virtual work of the forces: accumulated per bone first, so the cost hardly knows d or k.
         """
-        if self.problem.is_still(track):
+        if self.layout.is_still(track):
             return np.zeros(len(self.theta))
         result = self._pull_on_bones(track, forces)
         if self._moves_watched(track):
             moved = self._watched_derivative(track.width)  # (q, m, 3)
-            result[self.problem.watched_dofs] += moved.reshape(len(moved), -1) @ (track.watched.T @ forces).ravel()
+            result[self.layout.watched_dofs] += moved.reshape(len(moved), -1) @ (track.watched.T @ forces).ravel()
         return result
 
     def _pull_on_bones(self, track: Track, forces: FloatArray) -> FloatArray:
@@ -87,7 +88,7 @@ class PoseState:
         result = (moved.reshape(3 * d, -1) @ gram.matrix).reshape(d, -1) @ moved.reshape(d, -1).T
         if self._moves_watched(track):
             own = self._watched_rows(track)  # (q, k, 3)
-            weighted, dofs = own * gram.weights[:, None], self.problem.watched_dofs
+            weighted, dofs = own * gram.weights[:, None], self.layout.watched_dofs
             cross = np.stack([self._pull_on_bones(track, forces) for forces in weighted], axis=1)  # (d, q)
             result[:, dofs] += cross
             result[dofs] += cross.T
@@ -100,7 +101,7 @@ class PoseState:
         flat = track.times(self._derivative(track).reshape(3 * d, -1).T)  # (k, 3 d)
         result: FloatArray = flat.reshape(len(track), d, 3).transpose(0, 2, 1)
         if self._moves_watched(track):
-            result[:, :, self.problem.watched_dofs] += self._watched_rows(track).transpose(1, 2, 0)
+            result[:, :, self.layout.watched_dofs] += self._watched_rows(track).transpose(1, 2, 0)
         return result
 
     @cached_property
@@ -111,7 +112,7 @@ class PoseState:
 
     def _moves_watched(self, track: Track) -> bool:
         """Whether free dofs of black boxes move what a track carries."""
-        return track.watched is not None and len(self.problem.watched_dofs) > 0
+        return track.watched is not None and len(self.layout.watched_dofs) > 0
 
     def _watched_rows(self, track: Track) -> FloatArray:
         """(q, k, 3) derivative by the q dofs of black boxes of what a track takes from them."""
@@ -123,12 +124,12 @@ class PoseState:
     def _watched_derivative(self, width: int) -> FloatArray:
         """(q, m, 3) derivative of what black boxes evaluate by their q dofs, all others leave it where it is."""
         if not self._differences:
-            shape = len(self.problem.watched_dofs), len(self._watched[4]), 3
+            shape = len(self.layout.watched_dofs), len(self._watched[4]), 3
             self._differences.update({4: np.zeros(shape), 3: np.zeros(shape)})
             first = row = 0
             for index, motion in enumerate(self.motions):
                 if isinstance(motion, BlackBoxMotion):
-                    free = self.problem.free_of_body[index]
+                    free = self.layout.free_of_body[index]
                     rows, columns = slice(row, row + len(free)), slice(first, first + len(motion.points))
                     moved, turned = motion.derivatives(free)
                     self._differences[4][rows, columns], self._differences[3][rows, columns] = moved, turned
@@ -143,20 +144,20 @@ class PoseState:
     @cached_property
     def _carriers(self) -> FloatArray:
         """(3 j, 3) what carries outward normals, transposed, below one another."""
-        linear = self.world[:, :3, :3] if self.problem.is_rigid else outward_carrier(self.world)
+        linear = self.world[:, :3, :3] if self.layout.is_rigid else outward_carrier(self.world)
         return linear.transpose(0, 2, 1).reshape(-1, 3)
 
     @cached_property
     def _generators(self) -> FloatArray:
         """(e, 3, 4) velocity fields of the free dofs and of those that follow them."""
-        parts = [m.generators[rows] for m, rows in zip(self.motions, self.problem.fields_of_body, strict=True)]
+        parts = [m.generators[rows] for m, rows in zip(self.motions, self.layout.fields_of_body, strict=True)]
         return np.concatenate(parts)
 
     def _derivative(self, track: Track) -> FloatArray:
         """(d, 3, width b) derivative of the bones (or normal carriers) that a track uses."""
         key = (track.width, track.bones.tobytes())
         if key not in self._derivatives:
-            d, b = len(self.problem.field_moves), len(track.bones)
+            d, b = len(self.layout.field_moves), len(track.bones)
             if track.width == 4:
                 fields, carrier = self._generators, self.world.transpose(1, 0, 2)[:, track.bones].reshape(4, -1)
             else:
@@ -164,8 +165,8 @@ class PoseState:
                 fields = np.einsum("daa->d", linear)[:, None, None] * np.eye(3) - linear.transpose(0, 2, 1)
                 carrier = self._carriers[track.columns].T
             moved = (fields.reshape(3 * d, -1) @ carrier).reshape(d, 3, b, track.width)
-            moved *= self.problem.field_moves[:, None, track.bones, None]
-            coupling = self.problem.coupling
+            moved *= self.layout.field_moves[:, None, track.bones, None]
+            coupling = self.layout.coupling
             moved = moved.reshape(d, -1) if coupling is None else coupling @ moved.reshape(d, -1)
             self._derivatives[key] = moved.reshape(len(self.theta), 3, -1)
         return self._derivatives[key]

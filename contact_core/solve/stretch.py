@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -14,12 +14,10 @@ from contact_core.rig.rig import Rig
 from contact_core.rig.skinning import vertex_track
 from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
+from contact_core.solve.bare_problem import BareProblem
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.state import PoseState
-from contact_core.solve.terms import BoundTerm
-
-if TYPE_CHECKING:
-    from contact_core.solve.problem import PoseProblem
+from contact_core.solve.term import BoundTerm
 
 _SHARE = 0.01  # of the skin's edges: they are what a verdict looks at (`grasping.metrics`, its 99th percentile)
 _MOST = 0.02  # by which blends of two ends differ, below which an edge stretches with no pose worth speaking of
@@ -40,7 +38,7 @@ class SkinStretchTerm(HasSettings):
     samples: int = setting(1500, low=10, high=1_000_000, help="how many edges stand for the skin of a body")
     name: str = field(default="stretch")
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         skins = []
         for index, body in enumerate(problem.bodies):
             if body.black_box is None and len(body.rig.joints) > 1 and len(problem.free_of_body[index]):

@@ -1,8 +1,4 @@
-"""Terms of the pose objective: the protocol, and the three terms of the paper (eq. 3).
-
-A term is a few lines: `bind` makes once per problem what does not change during a solve, and answers
-something that gives value, gradient and Gauss-Newton matrix at a state. A term that is a sum of squares can
-subclass `LeastSquares` and give residuals and their Jacobian only.
+"""The three terms of the paper's objective (eq. 3).
 
 Scale: distances are in units of l = manipulator length / 18 (1 cm on an 18 cm hand), contact points weigh
 a_i / A, and the prior is divided by N_ref = 800, so the weights 1, 1, 10 keep the paper's meaning at any
@@ -11,81 +7,19 @@ scale and density.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
+from typing import ClassVar
 
 import numpy as np
 
 from contact_core.arrays import FloatArray
 from contact_core.settings import HasSettings, setting
+from contact_core.solve.bare_problem import BareProblem
 from contact_core.solve.state import PoseState
-
-if TYPE_CHECKING:
-    from contact_core.solve.problem import PoseProblem
+from contact_core.solve.term import BoundTerm, PoseTerm
 
 REFERENCE_COUNT = 800.0  # the paper's typical number of contact points
 SMALLEST_DISTANCE = 1e-3  # in l: where reweighting stops sharpening |d|
-
-
-class BoundTerm(Protocol):
-    """A term made ready for one problem. The term's weight is already inside."""
-
-    def value(self, state: PoseState) -> float: ...
-
-    def gradient(self, state: PoseState) -> FloatArray:
-        """(d,) exact derivative of `value`."""
-        ...
-
-    def normal_matrix(self, state: PoseState) -> FloatArray:
-        """(d, d) positive semidefinite model of the second derivative (Gauss-Newton or a majoriser)."""
-        ...
-
-
-@runtime_checkable
-class PoseTerm(Protocol):
-    """One term of the objective (hook `contact_pose_terms`, which takes classes: a problem makes its own).
-
-    Settings, the weight among them, are fields, see `contact_core.settings`; data such as solids are other fields.
-    A class whose `bind` reads neither the contacts nor the start may say `reads_contacts = False`: it then stays
-    bound while contacts are dragged (`PoseProblem.continued`).
-    """
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def summary(self) -> str: ...
-
-    @property
-    def weight(self) -> float: ...
-
-    def bind(self, problem: PoseProblem) -> BoundTerm:
-        """Make ready for one problem. Raises InvalidInput when the problem lacks what the term needs."""
-        ...
-
-
-class LeastSquares(ABC):
-    """A bound term 1/2 |r|^2 out of residuals r and their Jacobian."""
-
-    @abstractmethod
-    def residuals(self, state: PoseState) -> FloatArray:
-        """(m,)"""
-
-    @abstractmethod
-    def jacobian(self, state: PoseState) -> FloatArray:
-        """(m, d)"""
-
-    def value(self, state: PoseState) -> float:
-        r = self.residuals(state)
-        return 0.5 * float(r @ r)
-
-    def gradient(self, state: PoseState) -> FloatArray:
-        return self.residuals(state) @ self.jacobian(state)
-
-    def normal_matrix(self, state: PoseState) -> FloatArray:
-        jacobian = self.jacobian(state)
-        return jacobian.T @ jacobian
 
 
 @dataclass(frozen=True)
@@ -96,14 +30,14 @@ class DistanceTerm(HasSettings):
     weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "distance"
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         return _Squares(self, problem) if problem.form == "squares" else _Distances(self, problem)
 
 
 class _Squares:
     """The squared form: its Gauss-Newton matrix needs one constant gram matrix, whatever the number of points."""
 
-    def __init__(self, term: DistanceTerm, problem: PoseProblem) -> None:
+    def __init__(self, term: DistanceTerm, problem: BareProblem) -> None:
         self.gap = problem.pairs.gap
         self.factors = term.weight * problem.pairs.weights / problem.unit**2  # (k,)
         self.gram = self.gap.gram(2.0 * self.factors)
@@ -122,7 +56,7 @@ class _Squares:
 class _Distances:
     """The paper's unsquared form, with the reweighting that majorises |d| by a parabola."""
 
-    def __init__(self, term: DistanceTerm, problem: PoseProblem) -> None:
+    def __init__(self, term: DistanceTerm, problem: BareProblem) -> None:
         self.gap = problem.pairs.gap
         self.factors = term.weight * problem.pairs.weights / problem.unit  # (k,)
         self.smallest = SMALLEST_DISTANCE * problem.unit
@@ -149,12 +83,12 @@ class NormalTerm(HasSettings):
     weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "normal"
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         return _Normals(self, problem)
 
 
 class _Normals:
-    def __init__(self, term: NormalTerm, problem: PoseProblem) -> None:
+    def __init__(self, term: NormalTerm, problem: BareProblem) -> None:
         self.first, self.second = problem.pairs.manipulator_normals, problem.pairs.object_normals
         self.factors = term.weight * problem.pairs.facing  # (k,)
         # Lengths change little where skin bends and not at all elsewhere: as of the start, they keep the
@@ -202,12 +136,12 @@ class PriorTerm(HasSettings):
     weight: float = setting(10.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "prior"
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         return _Prior(self, problem)
 
 
 class _Prior:
-    def __init__(self, term: PriorTerm, problem: PoseProblem) -> None:
+    def __init__(self, term: PriorTerm, problem: BareProblem) -> None:
         self.prior = problem.prior_theta
         self.factors = term.weight / REFERENCE_COUNT * problem.prior_weights  # (d,)
         self.squares = problem.form == "squares"

@@ -13,12 +13,14 @@ from contact_core.arrays import FloatArray
 from contact_core.errors import Cancelled
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.progress import NO_PROGRESS, CallbackProgress
+from contact_core.solve.bare_problem import BareProblem
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import Iteration, PoseSolver, SolveOptions, SolveStatus
 from contact_core.solve.state import PoseState
-from contact_core.solve.terms import BoundTerm, DistanceTerm, paper_terms
+from contact_core.solve.term import BoundTerm
+from contact_core.solve.terms import DistanceTerm, paper_terms
 from contact_core.testing import rigs
 from contact_core.testing.contract import Contract, needs
 from contact_core.testing.settings_checks import check_settings
@@ -33,12 +35,12 @@ class Poison:
     name: str = "poison"
     summary: str = "breaks on purpose"
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         return _Poisoned(self.after, problem)
 
 
 class _Poisoned:
-    def __init__(self, after: int, problem: PoseProblem) -> None:
+    def __init__(self, after: int, problem: BareProblem) -> None:
         self.left, self.clean = after, DistanceTerm(0.0).bind(problem)
 
     def value(self, state: PoseState) -> float:

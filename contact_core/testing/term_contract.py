@@ -12,7 +12,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.rig.rig import Pose, Rig
 from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.terms import PoseTerm
+from contact_core.solve.term import PoseTerm
 from contact_core.testing import meshes, rigs
 from contact_core.testing.contract import Contract, needs
 from contact_core.testing.settings_checks import check_settings

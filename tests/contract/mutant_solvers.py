@@ -15,7 +15,8 @@ from contact_core.settings import HasSettings, setting
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions, SolveStatus
-from contact_core.solve.terms import DistanceTerm, PoseTerm
+from contact_core.solve.term import PoseTerm
+from contact_core.solve.terms import DistanceTerm
 from contact_core.testing.mutants import Mutant
 from contact_core.testing.solver_contract import SolverContract
 from contact_core.testing.term_contract import TermContract

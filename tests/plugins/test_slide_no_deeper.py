@@ -29,7 +29,7 @@ from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import Allowance, NoDeeperTerm
 from contact_core.solve.problem import PoseProblem
 from contact_core.solve.solver import PoseSolution, PoseSolver, SolveOptions
-from contact_core.solve.terms import PoseTerm
+from contact_core.solve.term import PoseTerm
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import TermContract
 

@@ -23,7 +23,8 @@ from contact_core.solve.body import Body, PairedPoints
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import PenetrationTerm, thinned
 from contact_core.solve.problem import PoseProblem
-from contact_core.solve.terms import DistanceTerm, NormalTerm, PoseTerm, PriorTerm, paper_terms
+from contact_core.solve.term import PoseTerm
+from contact_core.solve.terms import DistanceTerm, NormalTerm, PriorTerm, paper_terms
 from contact_core.testing import meshes, rigs
 from contact_core.testing.term_contract import TermContract, scene
 

@@ -13,10 +13,10 @@ from contact_core.rig.skinning import joint_track
 from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.state import PoseState
-from contact_core.solve.terms import BoundTerm, LeastSquares
+from contact_core.solve.term import BoundTerm, LeastSquares
 
 if TYPE_CHECKING:
-    from contact_core.solve.problem import PoseProblem
+    from contact_core.solve.bare_problem import BareProblem
 
 Vector = tuple[float, float, float]
 
@@ -55,12 +55,12 @@ class PinTerm(HasSettings):
         """The bodies that are pinned, each once: they take part in a solve though no pair names them."""
         return tuple(dict.fromkeys(pin.body for pin in self.pins))
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         return _Pins(self, problem)
 
 
 class _Pins(LeastSquares):
-    def __init__(self, term: PinTerm, problem: PoseProblem) -> None:
+    def __init__(self, term: PinTerm, problem: BareProblem) -> None:
         if not term.pins:
             raise InvalidInput("the pin term needs at least one Pin(body, joint, target).")
         self.tracks = [joint_track(*_place(problem, pin.body, pin.joint, [pin.point])) for pin in term.pins]
@@ -85,14 +85,14 @@ class LookTerm(HasSettings):
     weight: float = setting(1.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "look"
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         return _Looks(self, problem)
 
 
 class _Looks(LeastSquares):
     """Half the square of the difference of two unit vectors is one minus their cosine."""
 
-    def __init__(self, term: LookTerm, problem: PoseProblem) -> None:
+    def __init__(self, term: LookTerm, problem: BareProblem) -> None:
         if not term.looks:
             raise InvalidInput("the look term needs at least one Look(body, joint, target).")
         origin = (0.0, 0.0, 0.0)
@@ -130,7 +130,7 @@ def _unit(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
     return unit, (np.eye(3) - np.outer(unit, unit)) / length
 
 
-def _place(problem: PoseProblem, body: str, joint: str, points: list[Vector]) -> tuple[IntArray, FloatArray, int]:
+def _place(problem: BareProblem, body: str, joint: str, points: list[Vector]) -> tuple[IntArray, FloatArray, int]:
     """Joint indices, local points and first bone for `joint_track`."""
     index = problem.body_index(body)
     number = problem.bodies[index].rig.joint_index(joint)

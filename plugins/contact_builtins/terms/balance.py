@@ -16,10 +16,10 @@ from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import PairedPoints
 from contact_core.solve.state import PoseState
-from contact_core.solve.terms import BoundTerm, LeastSquares
+from contact_core.solve.term import BoundTerm, LeastSquares
 
 if TYPE_CHECKING:
-    from contact_core.solve.problem import PoseProblem
+    from contact_core.solve.bare_problem import BareProblem
 
 Vector = tuple[float, float, float]
 BEARS = 0.5  # the cosine of normal and up from which a surface bears what stands on it
@@ -42,7 +42,7 @@ class BalanceTerm(HasSettings):
     inside: float = setting(0.8, low=0.0, high=1.0, help="share of the support that is free to stand over")
     name: str = "balance"
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         length = float(np.linalg.norm(self.up))
         if not length > 0.0 or not np.isfinite(length):
             raise InvalidInput(f"up is a direction, but got {self.up}.")
@@ -50,7 +50,7 @@ class BalanceTerm(HasSettings):
 
 
 class _Balance(LeastSquares):
-    def __init__(self, term: BalanceTerm, up: FloatArray, problem: PoseProblem) -> None:
+    def __init__(self, term: BalanceTerm, up: FloatArray, problem: BareProblem) -> None:
         self.ground = np.linalg.svd(up[None])[2][1:]  # (2, 3) axes of the plane seen from above
         self.factor = np.sqrt(2.0 * term.weight) / problem.unit
         self.standing: list[tuple[Track, FloatArray]] = []
@@ -60,7 +60,7 @@ class _Balance(LeastSquares):
                 if len(hull):
                     self.standing.append((_centre_of_mass(body.rig, int(problem.bone_offsets[index])), hull))
 
-    def _support(self, problem: PoseProblem, body: str, up: FloatArray, inside: float) -> FloatArray:
+    def _support(self, problem: BareProblem, body: str, up: FloatArray, inside: float) -> FloatArray:
         """(h, 2) corners of what bears a body, counter-clockwise; none where nothing does."""
         points, gains = list[FloatArray](), list[FloatArray]()
         for contact in problem.contacts:
@@ -97,7 +97,7 @@ def _centre_of_mass(rig: Rig, first_bone: int) -> Track:
     return middles.summed(volumes / volumes.sum())
 
 
-def _bearing(problem: PoseProblem, contact: PairedPoints, up: FloatArray) -> FloatArray:
+def _bearing(problem: BareProblem, contact: PairedPoints, up: FloatArray) -> FloatArray:
     """(k, 3) points of a contact's object that stand still and face up, world."""
     index = problem.body_index(contact.object)
     body = problem.bodies[index]

@@ -15,10 +15,10 @@ from contact_core.rig.track import Track
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.body import uniform_scale
 from contact_core.solve.state import PoseState
-from contact_core.solve.terms import BoundTerm, LeastSquares
+from contact_core.solve.term import BoundTerm, LeastSquares
 
 if TYPE_CHECKING:
-    from contact_core.solve.problem import PoseProblem
+    from contact_core.solve.bare_problem import BareProblem
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class SelfCollisionTerm(HasSettings):
     weight: float = setting(5.0, low=0.0, help="how much it counts beside the other terms")
     name: str = "self-collision"
 
-    def bind(self, problem: PoseProblem) -> BoundTerm:
+    def bind(self, problem: BareProblem) -> BoundTerm:
         return _SelfCollision(self, problem)
 
 
@@ -53,7 +53,7 @@ class _Overlap:
 
 
 class _SelfCollision(LeastSquares):
-    def __init__(self, term: SelfCollisionTerm, problem: PoseProblem) -> None:
+    def __init__(self, term: SelfCollisionTerm, problem: BareProblem) -> None:
         self.bodies = []
         for index, body in enumerate(problem.bodies):
             if len(body.rig.joints) > 1 and len(problem.free_of_body[index]):
@@ -91,7 +91,7 @@ class _SelfCollision(LeastSquares):
         return kept
 
 
-def _moving(problem: PoseProblem, index: int, capsules: Capsules) -> IntArray:
+def _moving(problem: BareProblem, index: int, capsules: Capsules) -> IntArray:
     """(p, 2) the pairs whose capsules can move against one another: between them a joint is free. A body whose
     hand alone is posed has few such."""
     body, chart = problem.bodies[index], problem.charts[index]

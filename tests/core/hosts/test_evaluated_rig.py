@@ -77,7 +77,7 @@ def test_a_solve_returns_a_pose_of_the_host(by: float) -> None:
     every = rigs.SurfacePoints(np.arange(len(rig.faces)), np.full((len(rig.faces), 3), 1.0 / 3.0))
     found = HostRig(scene, name, check_skin(scene, name), ()).body(name, None, np.eye(4))
     contact = PairedPoints("skin", name, every, "target", every)
-    solution = LevenbergMarquardt().solve(PoseProblem((found, target), (contact,), (DistanceTerm(),)))
+    solution = LevenbergMarquardt().solve(PoseProblem((found, target), (contact,), terms=(DistanceTerm(),)))
     scene.write_pose(name, poses_of(solution, {name: rig})[name])
     away = np.linalg.norm(scene.skin_points(name, scene.read_pose(name)) - where, axis=1)
     assert away.max() <= 0.01 * rig.surface.bounding_box_diagonal

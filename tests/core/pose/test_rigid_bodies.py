@@ -70,7 +70,7 @@ def problem(mesh: TriangleMesh, *, movable: bool, kept: bool) -> PoseProblem:
         body = Body("object", rig, Pose.rest(rig), placed)
     contact = PairedPoints("all", hand.name, ends[0], "object", ends[1])
     terms = (*paper_terms(), PenetrationTerm(resolution=16))
-    return PoseProblem((Body.skinned(hand), body), (contact,), terms)
+    return PoseProblem((Body.skinned(hand), body), (contact,), terms=terms)
 
 
 @pytest.mark.parametrize("name", ["noisy", "torus", "saddle"])
