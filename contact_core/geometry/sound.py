@@ -149,15 +149,18 @@ def _doubles(suspects: IntArray, group: IntArray, sizes: IntArray, indices: IntA
     count = len(group)
     graph = coo_array((np.ones(len(indices), np.int8), (indices, first)), shape=(count, count))
     _, part = connected_components(graph, directed=False)
-    seen: dict[tuple[int, ...], list[IntArray]] = {}
+    parts: dict[
+        tuple[int, ...], int
+    ] = {}  # of the faces kept in each place: all those of one place are of one part
+    seen: set[tuple[int, ...]] = set()
     doubles = list[int]()
     for face in suspects.tolist():
-        corners = np.sort(indices[starts[face] : starts[face] + sizes[face]])
-        others = seen.setdefault(tuple(sorted(group[corners].tolist())), [])
-        if any(part[o[0]] != part[corners[0]] or np.array_equal(o, corners) for o in others):
+        corners = tuple(np.sort(indices[starts[face] : starts[face] + sizes[face]]).tolist())
+        own = int(part[corners[0]])
+        if corners in seen or parts.setdefault(tuple(sorted(group[list(corners)].tolist())), own) != own:
             doubles.append(face)
         else:
-            others.append(corners)
+            seen.add(corners)
     return doubles
 
 

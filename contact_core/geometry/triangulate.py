@@ -72,46 +72,15 @@ def clip_ears(polygon: IntArray, corners: FloatArray) -> tuple[IntArray, bool]:
 
     polygon: (k,) indices that the triangles are made of. corners: (k, 3) their positions, nearly in a plane.
     """
+    from contact_core.geometry.clip_kernels import clip
+
     flat = _in_its_plane(corners)  # (k, 2), counter-clockwise
     count = len(polygon)
     before, after = np.roll(np.arange(count), 1), np.roll(np.arange(count), -1)
-    alive = np.ones(count, bool)
-    turn = _cross(flat - flat[before], flat[after] - flat)  # (k,) > 0 where convex
-    worth = np.array([_ear_worth(v, before, after, flat, turn, alive) for v in range(count)])
-    triangles = np.empty((count - 2, 3), np.int64)
-    complete = True
-    for step in range(count - 2):
-        ear = int(np.argmax(worth))
-        if worth[ear] < 0:  # no ear is left: cut where it turns most, and say so
-            ear = int(np.argmax(np.where(alive, turn, -np.inf)))
-            complete = complete and bool(abs(turn[ear]) <= 1e-12 * np.abs(flat).max(initial=0.0) ** 2)
-        left, right = before[ear], after[ear]
-        triangles[step] = polygon[[left, ear, right]]
-        after[left], before[right], alive[ear], worth[ear] = right, left, False, -np.inf
-        for v in (left, right):
-            turn[v] = _cross(flat[v] - flat[before[v]], flat[after[v]] - flat[v])
-        for v in (left, right):
-            worth[v] = _ear_worth(v, before, after, flat, turn, alive)
-    return triangles, complete
-
-
-def _ear_worth(
-    v: int, before: IntArray, after: IntArray, flat: FloatArray, turn: FloatArray, alive: BoolArray
-) -> float:
-    """Smallest angle (rad) of the triangle that clipping corner v would cut; -1 when v is no ear."""
-    if turn[v] <= 0.0:
-        return -1.0
-    a, b, c = flat[before[v]], flat[v], flat[after[v]]
-    other = alive & (turn <= 0.0)  # only corners that do not turn left can lie in an ear
-    other[[before[v], v, after[v]]] = False
-    q = flat[other]
-    inside = (_cross(b - a, q - a) >= 0) & (_cross(c - b, q - b) >= 0) & (_cross(a - c, q - c) >= 0)
-    twin = (q == a).all(axis=1) | (q == b).all(axis=1) | (q == c).all(axis=1)  # the lips of a slit
-    if (inside & ~twin).any():
-        return -1.0
-    edges = np.array([b - a, c - b, a - c])  # (3, 2)
-    angles = [np.arctan2(_cross(edges[k], edges[k - 2]), -(edges[k] @ edges[k - 2])) for k in range(3)]
-    return float(min(angles))
+    cut = np.empty((count - 2, 3), np.int64)
+    level = 1e-12 * float(np.abs(flat).max(initial=0.0)) ** 2
+    complete = clip(flat, before, after, np.ones(count, np.int64), np.empty(count), np.empty(count), level, cut)
+    return polygon[cut], bool(complete)
 
 
 def _split_quads(quads: IntArray, points: FloatArray) -> IntArray:
@@ -153,11 +122,6 @@ def _in_its_plane(corners: FloatArray) -> FloatArray:
     x = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     y = np.cross(normal, x)
     return np.stack([centred @ (x / np.linalg.norm(x)), centred @ (y / np.linalg.norm(y))], axis=1)
-
-
-def _cross(u: FloatArray, v: FloatArray) -> Any:
-    """z of the cross product of plane vectors (..., 2)."""
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
 def _all_different(corners: IntArray) -> BoolArray:

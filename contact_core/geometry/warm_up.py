@@ -13,6 +13,7 @@ from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.geometry.tangent import direction_to_heading, heading_to_direction
 from contact_core.geometry.thinning import first_of_each, meeting, spacing_of
 from contact_core.geometry.topology import Topology
+from contact_core.geometry.triangulate import triangulate
 
 
 def warm_up() -> float:
@@ -28,5 +29,6 @@ def warm_up() -> float:
     direction_to_heading(mesh, ends, heading_to_direction(mesh, ends, headings))
     first_of_each(points, 0.1)
     sound_polygons(points, [3, 3, 3], mesh.faces.ravel())
+    triangulate([5], [0, 1, 2, 3, 4], points)
     meeting(mesh.points, mesh.points, 0.1, spacing_of(mesh.points, 2))
     return time.perf_counter() - start

@@ -332,3 +332,14 @@ def test_pieces_are_those_of_a_graph(faces: int, joined: list[tuple[int, int]]) 
     count, wanted = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(faces, faces)), directed=False)
     assert number_pieces(a, b, piece) == count
     assert (piece == wanted).all()
+
+
+def test_a_hundred_thousand_leaves_of_a_book_are_told_apart() -> None:
+    """Faces round one edge whose outer corners lie close together: every pair of them was compared."""
+    leaves = 100_000
+    round_ = np.linspace(0.0, 2.0 * np.pi, leaves, endpoint=False)
+    points = np.concatenate([[[0, 0, 0], [0, 0, 1]], np.c_[np.cos(round_), np.sin(round_), np.full(leaves, 0.5)]])
+    faces = np.c_[np.zeros(leaves, np.int64), np.ones(leaves, np.int64), np.arange(2, leaves + 2)]
+    twice = np.concatenate([faces, faces[:10, [1, 2, 0]]])
+    sound = sound_polygons(points, np.full(len(twice), 3), twice.ravel())
+    assert sound.face_of.tolist() == list(range(leaves)) and "10 faces lay on another face" in sound.notes[0]
