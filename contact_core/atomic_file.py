@@ -4,30 +4,101 @@ hostile file does not fill the memory."""
 from __future__ import annotations
 
 import contextlib
+import errno
+import mmap
 import os
 import re
 import secrets
 import stat
+import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 from contact_core.errors import FileRefused
+from contact_core.mounts import mount_of
+
+_ATTEMPTS = 5  # at a file that other machines go on replacing
+_PATIENCE_S = 2.0  # for whoever reads a file at the moment at which it is replaced
+_BUSY = {errno.EBUSY, errno.ETXTBSY, errno.EEXIST}  # what SMB says where somebody has the file open
+_BUSY_WINDOWS = {5, 32}  # access denied, sharing violation
+_PIECE = 1 << 20
 
 
 def read_bounded(path: Path | str, max_bytes: int) -> bytes:
-    """The bytes of a plain file of at most `max_bytes`. Raises FileRefused for any other."""
+    """The bytes of a plain file of at most `max_bytes`, as it is now: on a folder that other machines write, too.
+
+    Raises FileRefused for any other.
+    """
     check_no_null(path)
+    for attempt in range(_ATTEMPTS):
+        try:
+            return _read(path, max_bytes)
+        except OSError as error:
+            if error.errno != errno.ESTALE or attempt == _ATTEMPTS - 1:
+                raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
+    raise AssertionError  # the last attempt returns or raises
+
+
+def _read(path: Path | str, max_bytes: int) -> bytes:
+    """As read_bounded. Raises OSError; ESTALE where another machine replaced the file while it was read (NFS)."""
+    with open(path, "rb", opener=_open_nonblocking) as stream:  # the only one with an opener
+        status = os.fstat(stream.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise FileRefused(f"cannot read {path}: it is not a plain file.")
+        mount = mount_of(status)
+        data = _read_past_caches(path, max_bytes) if mount is not None and mount.is_shared else None
+        size = status.st_size if data is None else len(data)
+        if size > max_bytes:
+            raise FileRefused(f"{path} has {size} bytes; more than {max_bytes} are refused.")
+        return stream.read() if data is None else data
+
+
+def _read_past_caches(path: Path | str, max_bytes: int) -> bytes | None:
+    """The bytes that the server of a network folder has, at most one more than `max_bytes`; None where no such
+    reading is possible.
+
+    FUSE mounts (sshfs, SMB, object stores, shares of virtual machines) remember the size of a file for up to 20 s,
+    and the system cuts every reading there: what another machine has appended to a journal would be missing, and
+    nobody would know.
+    """
+    if not hasattr(os, "O_DIRECT"):
+        return None
     try:
-        with open(path, "rb", opener=_open_nonblocking) as stream:  # the only one with an opener
-            status = os.fstat(stream.fileno())
-            if not stat.S_ISREG(status.st_mode):
-                raise FileRefused(f"cannot read {path}: it is not a plain file.")
-            if status.st_size > max_bytes:
-                raise FileRefused(f"{path} has {status.st_size} bytes; more than {max_bytes} are refused.")
-            return stream.read()
+        file = os.open(path, os.O_RDONLY | os.O_DIRECT | os.O_NONBLOCK)
     except OSError as error:
-        raise FileRefused(f"cannot read {path}: {error.strerror or error}.") from error
+        if error.errno == errno.ESTALE:
+            raise
+        return None
+    parts, total = [], 0
+    try:
+        with mmap.mmap(-1, _PIECE) as piece:  # its start and length suit every file system
+            while total <= max_bytes and (count := os.readv(file, [piece])) > 0:
+                parts.append(piece[:count])
+                total += count
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+        return None
+    finally:
+        os.close(file)
+    return b"".join(parts)
+
+
+def is_there(path: Path) -> bool:
+    """Whether a path names anything. Raises FileRefused where the system cannot tell: a server that does not answer
+    is no reason to take a document for a new one, or to write over it."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            return False
+        raise FileRefused(f"cannot look at {path}: {error.strerror or error}.") from error
+    except ValueError:  # a null character
+        return False
+    return True
 
 
 def check_no_null(path: Path | str) -> None:
@@ -69,6 +140,21 @@ def replacing(path: Path | str) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def put_in_place(source: Path, target: Path) -> None:
+    """Rename a file over another, waiting a moment for those who read it: Windows and SMB replace no file that
+    somebody has open, and readers of ours are soon done. Raises OSError."""
+    end = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            source.replace(target)
+            return
+        except OSError as error:
+            busy = error.errno in _BUSY or getattr(error, "winerror", None) in _BUSY_WINDOWS
+            if not busy or target.is_dir() or time.monotonic() > end:
+                raise
+        time.sleep(0.02)
+
+
 def remove_leftovers(path: Path) -> None:
     """Remove the temporary files of writers of `path` that were killed. Only for who has the right to write it:
     the temporary file of a writer that still runs looks the same."""
@@ -90,7 +176,7 @@ def _commit(temporary: Path, target: Path) -> None:
         os.fsync(stream.fileno())
     if target.is_file():
         temporary.chmod(stat.S_IMODE(target.stat().st_mode))
-    temporary.replace(target)
+    put_in_place(temporary, target)
     with contextlib.suppress(OSError):  # not every system opens folders, nor flushes them
         folder = os.open(target.parent, os.O_RDONLY)
         try:

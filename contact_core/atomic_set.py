@@ -5,13 +5,18 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import socket
 import tempfile
+import zlib
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from contact_core.atomic_file import put_in_place
 from contact_core.errors import FileRefused
 
 _STAGING = ".contact-staging-"
+_MACHINE = f"{_STAGING}{zlib.crc32(socket.gethostname().encode()):08x}-"  # locks of folders end at this machine
+_STALE_S = 24 * 3600.0
 
 
 @contextlib.contextmanager
@@ -20,16 +25,17 @@ def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
 
     names: of all files of the set. The old ones stay as they are until the last of the new is on the disk; one
     that the new set lacks (a picture that nothing could draw) is gone afterwards. Whoever publishes at the same
-    moment waits, so that two sets never mix; only a process killed between two renames leaves some of each. The
-    staging folder of a killed process is removed by the next. Raises FileRefused.
+    moment on this machine waits, so that two sets never mix; only a process killed between two renames leaves some
+    of each, and two machines in a shared folder at one moment. The staging folder of a killed process is removed by
+    the next on its machine, by others after a day. Raises FileRefused.
     """
     check_writable(folder, names)
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with _exclusive(folder):
-            _remove_leftovers(folder)
-            stage = Path(tempfile.mkdtemp(prefix=_STAGING, dir=folder))
+            stage = Path(tempfile.mkdtemp(prefix=_MACHINE, dir=folder))
+            _remove_leftovers(folder, stage)
             in_use = _lock(stage, wait=False)
     except OSError as error:
         raise FileRefused(f"cannot write into {folder}: {error.strerror or error}.") from error
@@ -40,7 +46,7 @@ def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
             written = sorted(path.name for path in stage.iterdir())
             untouched = False
             for name in written:
-                (stage / name).replace(folder / name)
+                put_in_place(stage / name, folder / name)
             for name in set(names) - set(written):  # what an earlier run left would not belong to this set
                 (folder / name).unlink(missing_ok=True)
     except FileRefused as error:  # in the words of the folder that was asked for
@@ -71,9 +77,21 @@ def check_writable(folder: Path, names: Collection[str]) -> None:
             raise FileRefused(f"cannot write {folder / name}: it is a folder. Name another folder, or remove it.")
 
 
-def _remove_leftovers(folder: Path) -> None:
-    """Remove the staging folders of processes that were killed; one that is in use is locked by its process."""
+def _remove_leftovers(folder: Path, mine: Path) -> None:
+    """Remove the staging folders of processes that were killed. mine: made just now.
+
+    One that is in use is locked by its process. No file system tells other machines of the locks of folders, so
+    theirs go by age, by the clock of the server that dates them.
+    """
+    now = mine.stat().st_mtime
     for stage in folder.glob(_STAGING + "*"):
+        if stage == mine:
+            continue
+        if not stage.name.startswith(_MACHINE):
+            with contextlib.suppress(OSError):
+                if now - stage.stat().st_mtime > _STALE_S:
+                    shutil.rmtree(stage, ignore_errors=True)
+            continue
         lock = _lock(stage, wait=False)
         if lock is not None:
             shutil.rmtree(stage, ignore_errors=True)

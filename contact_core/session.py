@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from contact_core.atomic_file import is_there
 from contact_core.document.document import ContactDocument
 from contact_core.document.frozen_map import FrozenMap
 from contact_core.edit.command import Command
@@ -153,7 +154,7 @@ class Session(GraspingSession):
         session = cls(**arguments)
         try:
             commands = BUILT_IN_COMMANDS
-            if journal_path(real_path(Path(path))).exists():  # it may hold commands of plugins
+            if is_there(journal_path(real_path(Path(path)))):  # it may hold commands of plugins
                 commands = session.plugins.offers(COMMANDS)
             session._start_from(*OpenDocument.open(Path(path), commands))
         except BaseException:

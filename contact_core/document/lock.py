@@ -8,6 +8,7 @@ refuses locks is said so, and the document is opened read-only. Nothing waits fo
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import getpass
 import json
@@ -17,6 +18,10 @@ import sys
 import time
 from pathlib import Path
 from typing import Any
+
+from contact_core.atomic_file import read_bounded
+from contact_core.errors import FileRefused
+from contact_core.mounts import mount_of
 
 
 class DocumentLock:
@@ -42,19 +47,26 @@ class DocumentLock:
         except OSError as error:  # a share without a lock service
             os.close(file)
             return f"{path.parent} takes no locks ({error.strerror or error}), so nobody can tell who writes"
-        if not free:
-            os.close(file)
-            return f"{document_path.name} is open in {_holder(path)}"
-        os.ftruncate(file, 0)
-        os.lseek(file, 0, os.SEEK_SET)
-        os.write(file, json.dumps(_myself()).encode())
-        return cls(path, file)
+        reason = (
+            _why_not(path, document_path.name, file) if free else f"{document_path.name} is open in {_holder(path)}"
+        )
+        if reason is None:
+            try:
+                os.ftruncate(file, 0)
+                os.lseek(file, 0, os.SEEK_SET)
+                os.write(file, json.dumps(_myself()).encode())
+                return cls(path, file)
+            except OSError as error:
+                reason = f"{path.parent} cannot be written ({error.strerror or error})"
+        _close(file)
+        return reason
 
     def release(self) -> None:
         """Give the lock up; the lock file stays, and names no holder."""
         if self._file >= 0:
-            os.ftruncate(self._file, 0)
-            os.close(self._file)  # closing releases the lock
+            with contextlib.suppress(OSError):  # a server that is gone
+                os.ftruncate(self._file, 0)
+            _close(self._file)  # which releases the lock
             self._file = -1
 
 
@@ -79,12 +91,39 @@ def _myself() -> dict[str, Any]:
     return {"process": os.getpid(), "host": socket.gethostname(), "user": user, "since": started}
 
 
+def _why_not(path: Path, name: str, file: int) -> str | None:
+    """Where locks end at this machine: who on another one has the document, says the lock file. None for nobody."""
+    mount = mount_of(os.fstat(file))
+    if mount is None or not mount.keeps_locks:
+        return None
+    who = _named(path)
+    if who is None or who["host"] == socket.gethostname():
+        return None
+    return (
+        f"{name} is open in {_holder(path)}, says {path.name} (this folder passes no locks to other machines;"
+        " delete that file where nobody there has it open any more)"
+    )
+
+
 def _holder(path: Path) -> str:
-    try:
-        who = json.loads(path.read_bytes()[:4096])
-        return f"process {who['process']} of {who['user']} on {who['host']} since {who['since']}"
-    except (OSError, ValueError, KeyError, TypeError):
+    who = _named(path)
+    if who is None:
         return "another process"
+    return f"process {who['process']} of {who['user']} on {who['host']} since {who['since']}"
+
+
+def _named(path: Path) -> dict[str, Any] | None:
+    """Who a lock file names; None for nobody, or what cannot be read."""
+    try:
+        who = json.loads(read_bounded(path, 4096))
+    except (FileRefused, ValueError):
+        return None
+    return who if isinstance(who, dict) and _myself().keys() <= who.keys() else None
+
+
+def _close(file: int) -> None:
+    with contextlib.suppress(OSError):
+        os.close(file)
 
 
 _TAKEN = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}  # what systems say where another has it

@@ -17,10 +17,13 @@ from contact_core.atomic_file import write_atomic
 from contact_core.document.schema import content_with_digest
 from contact_core.edit.command import command_to_json
 from contact_core.edit.history import History, Step
-from contact_core.edit.journal_file import ID_DIGITS, SCHEMA, VERSION, encode_head, encode_line
+from contact_core.edit.journal_file import ID_DIGITS, SCHEMA, VERSION, JournalContents, encode_head, encode_line
 from contact_core.errors import FileRefused
 
 FLUSH_SECONDS = 0.1
+_UNTIL_SAVED = (
+    "Nothing more can be recorded until the document is saved: here, once the disk answers, or elsewhere."
+)
 
 
 class Journal:
@@ -64,6 +67,24 @@ class Journal:
         lines = (encode_line(event, number, journal_id) for number, event in enumerate(events, start=2))
         write_atomic(path, encode_head(header, content, journal_id) + b"".join(lines))
         return cls(path, 1 + len(events), journal_id)
+
+    @classmethod
+    def resume(cls, path: Path, contents: JournalContents) -> Journal | None:
+        """Go on with a journal as it was read. Raises FileRefused.
+
+        None where the system takes it for another length than was read, as mounts of other machines' files do for a
+        while: a line would be written over others there, and a new journal must be begun.
+        """
+        journal = cls(path, contents.last_number, contents.journal_id)
+        if journal._length == contents.length:
+            return journal
+        journal.close(record=False)
+        return None
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether it takes no more events: a disk or a server failed, and it is not known what of it is there."""
+        return self._broken is not None
 
     def did(self, step: Step) -> None:
         """Record a step about to be committed.
@@ -143,7 +164,7 @@ class Journal:
         try:
             os.ftruncate(self._file, self._length)
         except OSError:
-            self._broken = f"{reason} Nothing more can be recorded: save elsewhere and open the document again."
+            self._broken = f"{reason} {_UNTIL_SAVED}"
             raise FileRefused(self._broken) from error
         raise FileRefused(f"{reason} Make room, or save elsewhere.") from error
 
@@ -161,7 +182,7 @@ class Journal:
             try:
                 self.flush()
             except OSError as error:  # a disk that fails on fsync may have lost what it had taken
-                self._broken = f"the disk under {self.path} reports {error.strerror or error}; save elsewhere."
+                self._broken = f"the disk under {self.path} reports {error.strerror or error}. {_UNTIL_SAVED}"
 
 
 def _event_of(step: Step) -> dict[str, Any]:

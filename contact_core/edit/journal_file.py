@@ -61,7 +61,7 @@ class JournalContents:
     first: the line with the document that it begins with, None where it is lost. lines: the events, in order.
     damage: None, or a sentence on what is lost. cut_off: whether damage follows the last of the lines. name: of the
     file. beside: the canonical bytes of a document and the document: where the first line holds those very bytes,
-    they are not decoded again.
+    they are not decoded again. length: of the file, in bytes.
     """
 
     first: Line | None
@@ -71,6 +71,7 @@ class JournalContents:
     cut_off: bool
     name: str
     beside: tuple[bytes, ContactDocument] | None = None
+    length: int = 0
 
     @cached_property
     def _header(self) -> bytes | None:
@@ -146,7 +147,8 @@ def read_journal(path: Path, beside: tuple[bytes, ContactDocument] | None = None
 
     beside: the document file's canonical bytes and its document, as in `JournalContents`.
     """
-    found = [decode_line(raw) for raw in _raw_lines(read_bounded(path, MAX_BYTES))]
+    content = read_bounded(path, MAX_BYTES)
+    found = [decode_line(raw) for raw in _raw_lines(content)]
     sound = [line for line in found if line is not None]
     if not sound:
         raise FileRefused(f"{path} holds no sound line of a journal; nothing can be recovered from it.")
@@ -160,7 +162,7 @@ def read_journal(path: Path, beside: tuple[bytes, ContactDocument] | None = None
     damage = _damage(path.name, sorted(lines), cut_off, in_order)
     head = lines.pop(1, None)
     events = tuple(lines[number] for number in sorted(lines))
-    contents = JournalContents(head, journal_id, events, damage, cut_off, path.name, beside)
+    contents = JournalContents(head, journal_id, events, damage, cut_off, path.name, beside, len(content))
     if not contents.closed:
         _ = contents.base  # refused now where it is none
     return contents

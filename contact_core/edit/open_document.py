@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -94,6 +95,10 @@ class OpenDocument:
             self.notes += (f"{self.path.name} was changed by something else; that version is kept as {kept}.",)
         self._digest = write_document(self.path, history.document)
         if self._journal is not None:
+            if self._journal.is_broken:  # the disk is back: what it was not told of is in the history
+                with contextlib.suppress(FileRefused):
+                    self._journal.close(record=False)
+                self._journal = Journal.start(journal_path(self.path), history, self._digest)
             self._journal.saved(history.revision, self._digest)
 
     def restart(self, history: History) -> None:

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from contact_core.atomic_file import read_bounded, remove_leftovers, write_atomic
+from contact_core.atomic_file import is_there, put_in_place, read_bounded, remove_leftovers, write_atomic
 from contact_core.document.document import ContactDocument
 from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import (
@@ -23,6 +23,7 @@ from contact_core.document.schema import (
 from contact_core.edit.command_table import BUILT_IN_COMMANDS, CommandTable
 from contact_core.edit.history import History
 from contact_core.edit.journal import Journal
+from contact_core.edit.journal_file import MAX_BYTES as JOURNAL_BYTES
 from contact_core.edit.journal_file import JournalContents, read_journal
 from contact_core.edit.replay import Replayed, replay
 from contact_core.errors import EditedFile, FileRefused
@@ -95,7 +96,7 @@ def accept_file(path: Path) -> str:
 
     Raises FileRefused where it is no document, cannot be written, or another session has it open.
     """
-    lock = DocumentLock.take(path) if path.exists() else None
+    lock = DocumentLock.take(path) if is_there(path) else None
     if isinstance(lock, str):
         raise FileRefused(f"cannot accept {path}: {lock}.")
     try:
@@ -110,7 +111,7 @@ def digest_of(path: Path) -> str | None:
 
     Raises FileRefused where it cannot be read.
     """
-    if not path.exists():
+    if not is_there(path):
         return None
     raw = read_bounded(path, MAX_BYTES)
     digest = written_digest(raw)
@@ -145,7 +146,7 @@ def read_only_document(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -
     """The document at a path as last saved, nothing locked and nothing written; before its first save, as the
     journal beside it has it. Raises FileRefused."""
     beside = journal_path(path)
-    if not path.exists() and beside.exists():
+    if not is_there(path) and is_there(beside):
         return replay(read_journal(beside), commands).history.document
     return read_document(path)[0]
 
@@ -161,7 +162,7 @@ def set_aside(path: Path) -> str | None:
     where nothing that is not saved is in it: then it is PATH.journal.previous until the next."""
     beside = journal_path(path)
     try:
-        old = read_journal(beside) if beside.exists() else None
+        old = read_journal(beside) if is_there(beside) else None
     except FileRefused:
         return _keep(beside, "damaged").name
     return None if old is None else _set_aside(beside, old)
@@ -170,14 +171,17 @@ def set_aside(path: Path) -> str | None:
 def _set_aside(beside: Path, old: JournalContents) -> str | None:
     if old.damage or (not old.closed and old.edits):
         return _keep(beside, "damaged" if old.damage else "unused").name
-    beside.replace(beside.with_name(beside.name + ".previous"))
+    try:
+        put_in_place(beside, beside.with_name(beside.name + ".previous"))
+    except OSError as error:
+        raise FileRefused(f"cannot move {beside} out of the way: {error.strerror or error}.") from error
     return None
 
 
 def _open_locked(path: Path, lock: DocumentLock, commands: CommandTable) -> OpenedFile:
     found, refused = _Found(path, lock, []), None
     try:
-        if path.exists():
+        if is_there(path):
             found = _Found(path, lock, found.notes, *parse_with_content(read_bounded(path, MAX_BYTES), str(path)))
     except FileRefused as error:
         refused = error
@@ -240,7 +244,7 @@ def _names(old: JournalContents, digest: str | None) -> bool:
 
 def _read_old_journal(found: _Found) -> JournalContents | None:
     """The journal beside a document, None without one; one that is none is kept, and a note says so."""
-    if not found.journal.exists():
+    if not is_there(found.journal):
         return None
     try:
         return read_journal(found.journal, None if found.content is None else (found.content, found.document))
@@ -262,9 +266,10 @@ def _resume(found: _Found, old: JournalContents, replayed: Replayed) -> OpenedFi
         told = " ".join(sentence for sentence in (old.damage, *replayed.trouble) if sentence)
         found.notes.append(f"{told} The whole journal is kept as {kept.name}.")
     found.notes.append(_outcome(found, history))
+    journal = None
     if sound and not old.closed and not found.damaged and _names(old, found.digest):
-        journal = Journal(beside, old.last_number, old.journal_id)
-    else:  # of what was replayed, and naming the file as it is now
+        journal = Journal.resume(beside, old)
+    if journal is None:  # of what was replayed, and naming the file as it is now
         journal = Journal.start(beside, history, found.digest)
         if saved is not None and found.digest is not None:
             journal.saved(saved, found.digest)
@@ -295,9 +300,9 @@ def _keep(path: Path, why: str, *, copy: bool = False) -> Path:
         number += 1
     try:
         if copy:
-            write_atomic(aside, path.read_bytes())
+            write_atomic(aside, read_bounded(path, JOURNAL_BYTES))
         else:
-            path.replace(aside)
+            put_in_place(path, aside)
     except OSError as error:
         raise FileRefused(f"cannot keep {path} as {aside.name}: {error.strerror or error}.") from error
     return aside

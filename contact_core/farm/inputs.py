@@ -10,10 +10,11 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -77,17 +78,43 @@ def noting_files() -> Iterator[dict[str, Stamp]]:
                 found.setdefault(path, stamp)
 
 
+class Clock:
+    """The time by the clock that dates files: a server's, where results and inputs lie on one."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        """folder: results go there; its server is asked once, by a file that is made in it and removed."""
+        self._ahead: dict[int, int] = {}
+        for place in () if folder is None else (folder, *folder.absolute().parents):
+            if place.is_dir():
+                with suppress(OSError), tempfile.NamedTemporaryFile(prefix=".contact-clock-", dir=place) as made:
+                    status = os.fstat(made.fileno())
+                    self._ahead[status.st_dev] = status.st_mtime_ns - time.time_ns()
+                break
+
+    def now(self, path: str) -> int:
+        """The time (ns) by which a file would be dated now; that of this machine where its server was not asked."""
+        with suppress(OSError, ValueError):
+            return time.time_ns() + self._ahead.get(Path(path).stat().st_dev, 0)
+        return time.time_ns()
+
+
 def as_read(
-    paths: Iterable[str | Path], beside: Path, digests: Digests, opened: Mapping[str, Stamp] | None = None
+    paths: Iterable[str | Path],
+    beside: Path,
+    digests: Digests,
+    opened: Mapping[str, Stamp] | None = None,
+    clock: Clock | None = None,
 ) -> list[Input]:
     """The files as they are now, sorted by name. beside: the job's own file. opened: how they were when they were
-    read, where that is known; one that is another now fits nothing, so that its job is done again."""
+    read, where that is known; one that is another now fits nothing, so that its job is done again. clock: that
+    dates them."""
+    clock = clock or Clock()
     found = []
     for path in sorted({os.path.realpath(path) for path in paths}):
         now = stamp_of(path)
         held = now == (opened or {}).get(path, now)
         size, changed, touched = now if held else GONE
-        if touched > time.time_ns() - _FRESH_NS:  # a second change within the same tick leaves the same times
+        if touched > clock.now(path) - _FRESH_NS:  # a second change within the same tick leaves the same times
             touched = 0
         digest = digests.of(path) if held else CHANGING
         file = _relative(path, beside)

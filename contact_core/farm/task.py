@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from contact_core._version import __version__
 from contact_core.atomic_file import read_bounded, write_atomic
 from contact_core.errors import Cancelled, ContactError, FileRefused, InvalidInput, MissingExtra
-from contact_core.farm.inputs import GONE, Digests, Stamp, as_read, first_change, noting_files, stamp_of
+from contact_core.farm.inputs import GONE, Clock, Digests, Stamp, as_read, first_change, noting_files, stamp_of
 from contact_core.plugins.registry import JOB_KINDS
 from contact_core.plugins.slots import JobOutcome, JobRequest
 from contact_core.progress import Progress
@@ -199,7 +199,8 @@ def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float, 
         raise FileRefused(f"cannot write into {folder}: {error.strerror or error}.") from error
     kind = plugins_of_this_process().get(JOB_KINDS, task.kind)
     request = JobRequest(path, folder, task.frames, task.solver, None if task.assets is None else Path(task.assets))
-    opened, now = {os.path.realpath(path): stamp_of(task.path)}, time.time_ns()
+    clock, opened = Clock(folder), {os.path.realpath(path): stamp_of(task.path)}
+    start = time.monotonic_ns()
     began, cpu = time.perf_counter(), time.process_time()
     with noting_files() as found:
         outcome = kind.run(request, plugins_of_this_process(), progress)
@@ -207,13 +208,14 @@ def _run(task: Task, progress: Progress) -> tuple[JobOutcome, list[Any], float, 
     inside = os.path.realpath(folder) + os.sep
     paths = {*found, *map(os.path.realpath, outcome.inputs), os.path.realpath(path)}
     paths = {path for path in paths if not path.startswith(inside)}
-    return outcome, as_read(paths, path, Digests(), _held(paths, now) | found | opened), took, cpu
+    held = _held(paths, time.monotonic_ns() - start, clock)
+    return outcome, as_read(paths, path, Digests(), held | found | opened, clock), took, cpu
 
 
-def _held(paths: Iterable[str], began: int) -> dict[str, Stamp]:
-    """For files that a library opened itself, and that were written since the job began (ns, by this machine's
-    clock): that they were not what they are now."""
-    return {path: GONE for path in paths if max(stamp_of(path)[1:]) > began}
+def _held(paths: Iterable[str], ago: int, clock: Clock) -> dict[str, Stamp]:
+    """For files that a library opened itself, and that were written since the job began (`ago`, in ns): that they
+    were not what they are now."""
+    return {path: GONE for path in paths if max(stamp_of(path)[1:]) >= clock.now(path) - ago}
 
 
 @cache

@@ -16,7 +16,6 @@ import os
 import re
 import secrets
 import shutil
-import time
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -165,13 +164,14 @@ class Library:
     def _stage(self) -> Iterator[Path]:
         """A folder beside the grasps in which one is written; what killed writers left a day ago goes."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        for old in self.folder.glob(_STAGING + "*"):
-            with contextlib.suppress(OSError):
-                if time.time() - old.stat().st_mtime > _STALE:
-                    shutil.rmtree(old, ignore_errors=True)
         stage = self.folder / f"{_STAGING}{secrets.token_hex(8)}"
         stage.mkdir()
         try:
+            now = stage.stat().st_mtime  # by the clock that dates the others: that of the server
+            for old in self.folder.glob(_STAGING + "*"):
+                with contextlib.suppress(OSError):
+                    if now - old.stat().st_mtime > _STALE:
+                        shutil.rmtree(old, ignore_errors=True)
             yield stage
         finally:
             shutil.rmtree(stage, ignore_errors=True)
@@ -180,22 +180,21 @@ class Library:
         """Rename the written folder to the first version that nobody took, if all of it is there."""
         if not all((stage / file).is_file() for file in (GRASP, CONTACTS)):
             raise FileRefused(
-                f"another machine, whose clock is a day ahead, took the unfinished grasp {name!r} for litter. Set"
-                " the clocks right, and save it again."
+                f"somebody removed the unfinished grasp {name!r} while it was written; save it again."
             )
         home = self.folder / name
         home.mkdir(exist_ok=True)
-        for _ in range(100):
-            number = max(self.versions(name), default=0) + 1
-            if number > MOST_VERSIONS:
-                break
+        number = max(self.versions(name), default=0) + 1
+        while number <= MOST_VERSIONS:
             if number > 1 and not replace:
                 raise FileRefused(f"somebody saved a grasp {name!r} at this moment; give another name.")
             try:
                 stage.rename(home / f"{number:04}")
-            except OSError as error:
-                if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+            except OSError as error:  # sshfs and Windows name no reason that would tell; a list may be old there
+                taken = error.errno in (errno.EEXIST, errno.ENOTEMPTY) or (home / f"{number:04}").is_dir()
+                if not taken or not stage.is_dir():
                     raise
+                number += 1
                 continue
             return number
         raise FileRefused(f"the grasp {name!r} has too many versions; give another name.")
