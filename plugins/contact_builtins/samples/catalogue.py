@@ -55,7 +55,7 @@ class GeneratedSample:
         return state.hexdigest()[:16]
 
 
-_KEEPERS = ("catalogue", "packing", "__main__")
+_KEEPERS = ("__init__", "__main__", "catalogue", "packing")
 HUMAN_HAND = GeneratedSample(
     "human_hand", "manipulator", "a right human hand, 18 cm, 25 joints, open and relaxed", "human_hand:build"
 )
