@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Usd, UsdGeom, UsdSkel, Vt
 
-from contact_core.arrays import FloatArray, IntArray
+from contact_core.arrays import BoolArray, FloatArray, IntArray
 from contact_core.document.asset import Asset
 from contact_core.errors import InvalidInput
 from contact_core.geometry.sound import sound_polygons
@@ -28,6 +28,7 @@ from contact_usd.primitives import is_hidden, names_of, stands_in
 
 INSTANCES = Usd.TraverseInstanceProxies()
 _FLAT = 1e-9  # volume of a unit cube in a joint's axes, made unit: below it the axes are as good as in one plane
+_ODD = 0.01  # of the points of a mesh, how many may have odd influences before it is damaged
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +195,8 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
     notes = list(arrays.notes)
     if query.HasBlendShapes():
         notes.append("blend shapes are not part of the rig; the skin is without them.")
-    joints, weights = _varying_influences(query, skeleton, len(arrays.points), path)
+    joints, weights, odd = _varying_influences(query, skeleton, len(arrays.points), path)
+    notes += odd
     # points at one position stay apart where their influences differ, or the skin would tear differently
     alike = np.unique(np.hstack([joints, weights]), axis=0, return_inverse=True)[1].reshape(-1)
     sound = sound_polygons(
@@ -227,26 +229,36 @@ def _read_part(query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery) ->
 
 def _varying_influences(
     query: UsdSkel.SkinningQuery, skeleton: UsdSkel.SkeletonQuery, count: int, path: str
-) -> tuple[IntArray, FloatArray]:
-    """(n, K) joints in the skeleton's order and weights, for constant influences and own joint orders too."""
+) -> tuple[IntArray, FloatArray, list[str]]:
+    """(n, K) joints in the skeleton's order and weights, for constant influences and own joint orders too, and
+    notes. A few odd influences count for nothing; many are damage."""
     computed = query.ComputeVaryingJointInfluences(count, AS_IT_STANDS)
     if computed is None or len(computed[0]) % max(count, 1):
         raise InvalidInput(f"{path}: the joint influences do not fit its {count} points.")
     joints = np.asarray(computed[0], np.int64).reshape(count, -1)
     weights = np.asarray(computed[1], np.float64).reshape(count, -1)
+    order = [str(token) for token in skeleton.GetJointOrder()]
+    own = None if query.GetJointOrder() is None else [str(token) for token in query.GetJointOrder()]
+    listed = len(order if own is None else own)
+    odd = ~np.isfinite(weights) | (joints < 0) | (joints >= listed)
+    points, notes = int(np.count_nonzero(odd.any(axis=1))), list[str]()
+    if 0 < points <= _ODD * count:
+        joints, weights = np.where(odd, 0, joints), np.where(odd, 0.0, weights)
+        notes.append(
+            f"{points} points had weights that are no numbers, or joints that are not there, which count as 0."
+        )
     if not np.isfinite(weights).all():
         raise InvalidInput(f"{path} has joint weights that are no numbers.")
-    own = query.GetJointOrder()
     if own is not None:
-        order = {str(token): k for k, token in enumerate(skeleton.GetJointOrder())}
-        lost = [str(token) for token in own if str(token) not in order]
+        place = {name: k for k, name in enumerate(order)}
+        lost = [name for name in own if name not in place]
         if lost:
             raise InvalidInput(f"{path} names the joint {lost[0]!r}, which its skeleton does not have.")
-        if not 0 <= joints.min() <= joints.max() < len(own):
+        if not 0 <= joints.min() <= joints.max() < listed:
             off = joints.min() if joints.min() < 0 else joints.max()
-            raise InvalidInput(f"{path} names its joint number {off}, but lists {len(own)} joints of its own.")
-        joints = np.array([order[str(token)] for token in own])[joints]
-    return joints, weights
+            raise InvalidInput(f"{path} names its joint number {off}, but lists {listed} joints of its own.")
+        joints = np.array([place[name] for name in own])[joints]
+    return joints, weights, notes
 
 
 def _influences(parts: list[SkinPart]) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
@@ -289,8 +301,7 @@ def _bind_world(query: UsdSkel.SkeletonQuery, prim: Usd.Prim) -> FloatArray:
             " bound is not said."
         )
     bind = np.stack([matrix_of(m) for m in given])
-    axes = np.where(np.isfinite(bind).all(axis=(1, 2), keepdims=True), bind, 0.0)[:, :3, :3]
-    upright = np.abs(np.linalg.det(axes)) > _FLAT * np.linalg.norm(axes, axis=1).prod(axis=1)  # (j,)
+    upright = _upright(bind)
     if not upright.all():
         raise InvalidInput(
             f"{prim.GetPath()}: the bindTransform of the joint {joints[int(upright.argmin())]} flattens space, or"
@@ -303,11 +314,25 @@ def _rest_local(
     skeleton: UsdSkel.Skeleton, parents: IntArray, bind: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """(j, 4, 4) rest transforms, or those of the bind pose where none are authored."""
-    given = skeleton.GetRestTransformsAttr().Get()
-    if isinstance(given, Vt.Matrix4dArray) and len(given) == len(parents):  # a layer may name any type
-        return np.stack([matrix_of(m) for m in given]), ()
     above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
-    return np.linalg.inv(above) @ bind, ("the skeleton has no rest pose; its bind pose stands in.",)
+    bound = np.linalg.inv(above) @ bind
+    given = skeleton.GetRestTransformsAttr().Get()
+    if not isinstance(given, Vt.Matrix4dArray) or len(given) != len(parents):  # a layer may name any type
+        return bound, ("the skeleton has no rest pose; its bind pose stands in.",)
+    rest = np.stack([matrix_of(m) for m in given])
+    odd = ~_upright(rest)
+    if not odd.any():
+        return rest, ()
+    names = [name for name, wrong in zip(joint_names(skeleton), odd, strict=True) if wrong]
+    return np.where(odd[:, None, None], bound, rest), (
+        f"the rest transforms of {', '.join(names[:8])} flatten space or are no numbers: the bind pose stands in.",
+    )
+
+
+def _upright(matrices: FloatArray) -> BoolArray:
+    """(j,) which of them are numbers and flatten nothing."""
+    axes = np.where(np.isfinite(matrices).all(axis=(1, 2), keepdims=True), matrices, 0.0)[:, :3, :3]
+    return np.asarray(np.abs(np.linalg.det(axes)) > _FLAT * np.linalg.norm(axes, axis=1).prod(axis=1))
 
 
 def _part_table(parts: list[SkinPart]) -> list[dict[str, object]]:

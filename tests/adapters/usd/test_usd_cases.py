@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import contact_core
 from contact_core.document.asset import Asset
 from contact_core.errors import FileRefused
 from contact_core.geometry.solids import box
+from contact_core.testing.format_contract import bar
 from contact_core.testing.host_checks import volume
 from contact_usd.files import UsdFiles
 from contact_usd.host import UsdHost
@@ -230,6 +232,47 @@ def test_primitives_have_their_size_and_axis(
     extent["XYZ".index(axis)] = reach[1]
     assert np.allclose(np.abs(mesh.points).max(0), extent, atol=1e-6)
     assert 0.985 * wanted < volume(mesh) < wanted * (1 + 1e-6)
+
+
+def changed_rig(path: Path, change: Callable[[UsdSkel.Skeleton, UsdSkel.BindingAPI], None]) -> Path:
+    """The bar of the contract, written here and then changed by pxr."""
+    UsdFiles().write(path, [bar()], {})
+    stage = Usd.Stage.Open(str(path))
+    (skeleton,) = [prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Skeleton)]
+    (mesh,) = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    change(UsdSkel.Skeleton(skeleton), UsdSkel.BindingAPI(mesh))
+    stage.Save()
+    return path
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_a_rest_transform_that_is_none_is_replaced_and_named(tmp_path: Path, value: float) -> None:
+    def change(skeleton: UsdSkel.Skeleton, binding: UsdSkel.BindingAPI) -> None:
+        rest = list(skeleton.GetRestTransformsAttr().Get())
+        rest[1] = Gf.Matrix4d(1).SetScale(value) * rest[1]
+        skeleton.GetRestTransformsAttr().Set(rest)
+
+    asset, whole = read(changed_rig(tmp_path / "m.usda", change)), bar()
+    assert asset.rig is not None and whole.rig is not None
+    assert np.allclose(asset.rig.rest_local, whole.rig.rest_local, atol=1e-6)
+    assert sum(asset.rig.joints[1] in note for note in asset.notes) == 1
+
+
+@pytest.mark.parametrize("kind", ["weights", "joints"])
+def test_few_odd_influences_count_for_nothing_and_many_are_damage(tmp_path: Path, kind: str) -> None:
+    def change(count: int) -> Callable[[UsdSkel.Skeleton, UsdSkel.BindingAPI], None]:
+        def spoil(skeleton: UsdSkel.Skeleton, binding: UsdSkel.BindingAPI) -> None:
+            primvar = binding.GetJointWeightsPrimvar() if kind == "weights" else binding.GetJointIndicesPrimvar()
+            values = np.array(primvar.Get())
+            values[:: primvar.GetElementSize()][:count] = np.nan if kind == "weights" else 99
+            primvar.Set(Vt.FloatArray.FromNumpy(values) if kind == "weights" else Vt.IntArray.FromNumpy(values))
+
+        return spoil
+
+    asset = read(changed_rig(tmp_path / "few.usda", change(1)))
+    assert asset.rig is not None and any("1 points had weights" in note for note in asset.notes)
+    with pytest.raises(FileRefused, match=r"no numbers|skin_joints"):
+        read(changed_rig(tmp_path / "many.usda", change(30)))
 
 
 def test_a_session_on_a_stage_tells_what_was_lost(tmp_path: Path) -> None:
