@@ -9,8 +9,8 @@ import runpy
 from pathlib import Path
 
 from contact_core.interaction.actions import actions_of, key_table
+from contact_core.interaction.tool import TOOLS
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import TOOLS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "interaction.md"
 APP = PAGE.with_name("app.md")

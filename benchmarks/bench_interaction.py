@@ -28,10 +28,10 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.interaction.events import Key, Pointer
 from contact_core.interaction.interaction import Interaction
+from contact_core.interaction.tool import TOOLS
 from contact_core.interaction.view import Perspective
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import read_asset
-from contact_core.plugins.registry import TOOLS
 from contact_core.session import Session
 from contact_core.solve.threads import one_blas_thread
 from contact_core.testing import meshes

@@ -13,8 +13,9 @@ from typing import Any
 
 from contact_core.interaction.actions import actions_of
 from contact_core.interaction.settings import InteractionSettings
+from contact_core.interaction.tool import TOOLS
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, POSE_SOLVERS, TOOLS
+from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, POSE_SOLVERS
 from contact_core.settings import Setting, settings_of
 
 TABLE = Path(__file__).parent / "contact_blender" / "extension" / "tools.json"

@@ -21,7 +21,8 @@ from contact_core.errors import ContactError
 from contact_core.interrupts import sigterm_as_interrupt
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.record import spell
-from contact_core.plugins.registry import CLI, resolve
+from contact_core.plugins.registry import CLI
+from contact_core.plugins.slot import resolve
 from contact_core.plugins.slots import CliCommand
 
 _OWN = (

@@ -25,6 +25,7 @@ from contact_core.grasping.finishing import Suggestion, finished
 from contact_core.grasping.hand import STRETCH_PRICE, STRETCHED, Hand, stretches, turn_about
 from contact_core.grasping.pads import disk
 from contact_core.grasping.scene import GraspScene
+from contact_core.grasping.slots import GRASP_SCORES
 from contact_core.hands.description import Pad
 from contact_core.library.capture import bone_ends, captured
 from contact_core.library.carrying import palm_in_rig, placed_at
@@ -35,7 +36,6 @@ from contact_core.library.shelf import Library
 from contact_core.library.verbs import library_scene
 from contact_core.plugins.manager import PluginManager
 from contact_core.plugins.reading import read_asset
-from contact_core.plugins.registry import GRASP_SCORES
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.draft import Draft
 from contact_core.rig.rig import Pose, forward_kinematics

@@ -16,8 +16,7 @@ from contact_core.grasping.hand import Hand
 from contact_core.grasping.loops import digits_through
 from contact_core.grasping.scene import GraspScene, uniform_scale_of
 from contact_core.grasping.screening import ALIKE, distinct, elsewhere, first_look, seen_from
-from contact_core.grasping.slots import KINDS, Approaches, GraspRequest, Kind, lacks
-from contact_core.plugins.registry import GRASP_SAMPLERS
+from contact_core.grasping.slots import GRASP_SAMPLERS, KINDS, Approaches, GraspRequest, Kind, lacks
 from contact_core.progress import NO_PROGRESS, Progress
 
 SECOND_LOOK = 220  # approaches that are closed with all starts of the thumb

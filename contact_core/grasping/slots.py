@@ -13,6 +13,7 @@ from contact_core.errors import InvalidInput
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.grasping.hand import Hand
+from contact_core.plugins.slot import SLOTS, Slot
 
 Kind = Literal["power", "precision", "hook", "lateral", "pinch"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -137,3 +138,7 @@ class GraspScore(Protocol):
         """How good a grasp is: finite, the higher the better; one that fails is worse than the same that does
         not."""
         ...
+
+
+GRASP_SAMPLERS: Slot[GraspSampler] = SLOTS["contact_grasp_samplers"]
+GRASP_SCORES: Slot[GraspScore] = SLOTS["contact_grasp_scores"]

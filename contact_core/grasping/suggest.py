@@ -19,8 +19,7 @@ from contact_core.grasping.finishing import Suggestion, finished
 from contact_core.grasping.pads import painted_pads, remark_on_size
 from contact_core.grasping.scene import GraspScene
 from contact_core.grasping.searching import GraspSettings, chosen, kinds_of, place_of, screened
-from contact_core.grasping.slots import Approaches, GraspScore, lacks
-from contact_core.plugins.registry import GRASP_SCORES
+from contact_core.grasping.slots import GRASP_SCORES, Approaches, GraspScore, lacks
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.draft import Draft
 

@@ -19,13 +19,12 @@ from contact_core.interaction.overlay import Handle, handle_under
 from contact_core.interaction.seen import Hit, SeenScene
 from contact_core.interaction.settings import InteractionSettings, Selection
 from contact_core.interaction.view import View, shows
-from contact_core.plugins.registry import TOOLS, Slot
+from contact_core.plugins.slot import Slot
 from contact_core.proposals.draft import Draft
 from contact_core.solve.term import PoseTerm
 
 if TYPE_CHECKING:
     from contact_core.edit.stroke import Stroke
-    from contact_core.interaction.tool import Tool
     from contact_core.session import Session
 
 
@@ -153,11 +152,6 @@ class Desk:
     def given(self, slot: Slot[Any], name: str) -> Mapping[str, Any]:
         """The settings that were set, by name."""
         return self._given.get((slot.hook, name), {})
-
-    def tool(self, name: str) -> Tool:
-        """A tool by name."""
-        found: Tool = self.made(TOOLS, name)
-        return found
 
     # -- the stroke ------------------------------------------------------------------------------------------
 

@@ -12,9 +12,9 @@ from contact_core.interaction.desk import Desk
 from contact_core.interaction.lock import Kind
 from contact_core.interaction.settings import InteractionSettings, Selection
 from contact_core.interaction.status import Part
-from contact_core.interaction.tool import Tool
+from contact_core.interaction.tool import TOOLS, Tool
 from contact_core.interaction.view import Perspective
-from contact_core.plugins.registry import TOOLS, Slot
+from contact_core.plugins.slot import Slot
 from contact_core.settings import configured
 
 if TYPE_CHECKING:
@@ -35,7 +35,12 @@ class Holding:
     @property
     def tools(self) -> tuple[Tool, ...]:
         """All tools, with their settings."""
-        return tuple(self.desk.tool(name) for name in self.session.plugins.offers(TOOLS))
+        return tuple(self.tool_named(name) for name in self.session.plugins.offers(TOOLS))
+
+    def tool_named(self, name: str) -> Tool:
+        """A tool by name, with its settings as they are now. Raises InvalidInput."""
+        found: Tool = self.desk.made(TOOLS, name)
+        return found
 
     @property
     def tool(self) -> str:
@@ -96,7 +101,7 @@ class Holding:
 
     def resize(self, factor: float) -> None:
         """Make the radius of the tool in the hand larger by a factor. Raises InvalidInput where it has none."""
-        resized = getattr(self.desk.tool(self._tool), "resized", None)
+        resized = getattr(self.tool_named(self._tool), "resized", None)
         if resized is None:
             raise InvalidInput(f"the tool {self._tool!r} has no radius.")
         self.configure(TOOLS, self._tool, radius=resized(self.desk, factor))

@@ -73,7 +73,7 @@ class Interaction(Holding):
 
     def take_up(self, name: str) -> None:
         """Take up a tool; a gesture under way is put back. Raises InvalidInput for a name that is not offered."""
-        self.desk.tool(name)
+        self.tool_named(name)
         self.cancel()
         self._tool, self._hover = name, NOTHING
         self._touch("tool", "overlay", "status")
@@ -168,7 +168,7 @@ class Interaction(Holding):
         elif event.kind == "leave":
             self._show_hover(NOTHING)
         elif event.kind == "move" and not self._camera_has and self._tool:
-            self._show_hover(self.desk.tool(self._tool).hover(self.desk, event))
+            self._show_hover(self.tool_named(self._tool).hover(self.desk, event))
         return False
 
     def _press(self, event: Pointer) -> bool:
@@ -181,7 +181,7 @@ class Interaction(Holding):
             self._touch("film")
         selection = self.desk.selection
         try:
-            gesture = self.desk.tool(self._tool).press(self.desk, event)
+            gesture = self.tool_named(self._tool).press(self.desk, event)
         except ContactError:
             self.desk.roll_back()
             raise
@@ -376,7 +376,7 @@ class Interaction(Holding):
     @property
     def status(self) -> Status:
         """For the line of status."""
-        hint = self.desk.tool(self._tool).hint if self._tool else ""
+        hint = self.tool_named(self._tool).hint if self._tool else ""
         if self._gesture is not None:
             hint = self._gesture.hint() or hint
         solve_ms = self._live.milliseconds if self._live is not None and self._live.solves else None

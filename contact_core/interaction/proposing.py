@@ -9,11 +9,11 @@ import numpy as np
 
 from contact_core.document.document import ContactDocument
 from contact_core.errors import CommandRejected
+from contact_core.grasping.slots import GRASP_SAMPLERS
 from contact_core.interaction.live import body_terms
 from contact_core.interaction.overlay import Ghost, Overlay
 from contact_core.interaction.seen import SeenScene, SeenSurface
 from contact_core.interaction.work import Worker
-from contact_core.plugins.registry import GRASP_SAMPLERS
 from contact_core.progress import Progress
 from contact_core.proposals.draft import Draft
 from contact_core.scene.problem import Objective

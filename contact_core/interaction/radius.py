@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from contact_core.interaction.events import Pointer
-from contact_core.interaction.tool import Gesture
-from contact_core.plugins.registry import TOOLS
+from contact_core.interaction.tool import TOOLS, Gesture
 
 if TYPE_CHECKING:
     from contact_core.interaction.holding import Holding
@@ -17,7 +16,7 @@ class RadiusGesture(Gesture):
 
     def __init__(self, holding: Holding) -> None:
         self._holding = holding
-        self._before = getattr(holding.desk.tool(holding.tool), "radius", None)
+        self._before = getattr(holding.tool_named(holding.tool), "radius", None)
         self._start: Pointer | None = None
         holding.resize(1.0)  # refuses a tool that has no radius
 

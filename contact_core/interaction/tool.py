@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 from contact_core.interaction.overlay import NOTHING, Overlay
+from contact_core.plugins.slot import SLOTS, Slot
 
 if TYPE_CHECKING:
     from contact_core.interaction.desk import Desk
@@ -73,3 +74,6 @@ class Tool(Protocol):
     def press(self, desk: Desk, pointer: Pointer) -> Gesture | None:
         """Begin at a press of the left button. None: nothing here for this tool, so the press is the camera's."""
         ...
+
+
+TOOLS: Slot[Tool] = SLOTS["contact_tools"]

@@ -20,6 +20,7 @@ from contact_core.geometry.tangent import direction_to_heading, heading_to_direc
 from contact_core.geometry.tracing import trace_geodesic
 from contact_core.grasping.finishing import Suggestion, finished, judged
 from contact_core.grasping.scene import GraspScene
+from contact_core.grasping.slots import GRASP_SCORES
 from contact_core.hands.description import Digit
 from contact_core.library.capture import bone_ends, meters, pairs_between
 from contact_core.library.carrying import (
@@ -34,7 +35,6 @@ from contact_core.library.carrying import (
 from contact_core.library.fitting import fitted
 from contact_core.library.places import CANDIDATES, like_places
 from contact_core.library.record import PALM, Grasp, SavedPad
-from contact_core.plugins.registry import GRASP_SCORES
 from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.proposals.draft import Draft
 from contact_core.rig.rig import Pose

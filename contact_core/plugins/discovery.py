@@ -12,7 +12,7 @@ from importlib.metadata import Distribution, distributions
 from typing import Literal
 
 from contact_core.errors import InvalidInput
-from contact_core.plugins.registry import resolve
+from contact_core.plugins.slot import resolve
 
 GROUP = "contact_core.plugins"
 VARIABLE = "CONTACT_PLUGINS"

@@ -18,7 +18,7 @@ from contact_core.plugins import hookspecs
 from contact_core.plugins.checks import api_refusal, hook_mistakes, is_wrapper
 from contact_core.plugins.discovery import Candidate, discovered
 from contact_core.plugins.record import Offer, PluginRecord
-from contact_core.plugins.registry import SLOTS, Slot, resolve, roles_of, shortcomings
+from contact_core.plugins.slot import SLOTS, Slot, resolve, roles_of, shortcomings
 from contact_core.settings import Setting, configured, settings_of
 
 T = TypeVar("T")
@@ -63,7 +63,7 @@ class PluginManager:
             raise InvalidInput(f"a plugin named {name!r} is registered already ({self._records[name].source}).")
         record = PluginRecord(name, "session", "this session", replaces=tuple(replaces))
         self._admit(record, lambda: plugin)
-        for slot in SLOTS:
+        for slot in SLOTS.values():
             if record.plugin is not None and hasattr(record.plugin, slot.hook):
                 self.offers(slot)
         if record.problems:
@@ -159,7 +159,7 @@ class PluginManager:
 
     def fill_all(self) -> None:
         """Ask for every slot, so that `records` tells everything."""
-        for slot in SLOTS:
+        for slot in SLOTS.values():
             self.offers(slot)
 
     def _try(self, candidate: Candidate) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from contact_core.interaction.actions import actions_of, key_table
+from contact_core.interaction.tool import TOOLS
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import TOOLS
 
 
 def test_the_table_of_keys_is_that_of_the_code(repository: Path) -> None:

@@ -19,7 +19,8 @@ from typing import Any
 import pytest
 
 from contact_core.plugins import hookspecs
-from contact_core.plugins.registry import AXIS_GENERATORS, SLOTS, Slot
+from contact_core.plugins.registry import AXIS_GENERATORS
+from contact_core.plugins.slot import SLOTS, Slot
 from contact_core.testing import SUITES
 from contact_core.testing.contract import Contract, clause_table
 
@@ -74,11 +75,11 @@ def page_of(slot: Slot[Any]) -> Path:
 
 
 def test_every_slot_has_a_page_with_a_plugin_and_its_proof() -> None:
-    assert {slot.hook for slot in SLOTS} == {name for name in HOOKS if "choose" not in name} - {
+    assert SLOTS.keys() == {name for name in HOOKS if "choose" not in name} - {
         "contact_document_changed",
         "contact_pose_solved",
     }
-    for slot in SLOTS:
+    for slot in SLOTS.values():
         (plugin, code), (test, proof) = files(page_of(slot)).items()
         assert test == f"test_{plugin}" and plugin.removesuffix(".py") in proof
         assert f"@hookimpl\ndef {slot.hook}():" in code
@@ -93,7 +94,7 @@ def test_a_generator_takes_less_than_thirty_lines() -> None:
 def pasted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files of all pages, as a new author copies them."""
     folder = tmp_path_factory.mktemp("pasted")
-    for slot in SLOTS:
+    for slot in SLOTS.values():
         for name, code in files(page_of(slot)).items():
             folder.joinpath(name).write_text(code, encoding="utf-8")
     return folder
@@ -123,7 +124,7 @@ def test_the_steps_for_a_new_author_work(pasted: Path, tmp_path: Path) -> None:
 
 
 def test_every_pasted_plugin_is_listed_without_a_problem(pasted: Path) -> None:
-    modules = {next(iter(files(page_of(slot)))).removesuffix(".py"): slot for slot in SLOTS}
+    modules = {next(iter(files(page_of(slot)))).removesuffix(".py"): slot for slot in SLOTS.values()}
     told = typed("contact plugins --json", pasted, PYTHONPATH=".", CONTACT_PLUGINS=",".join(modules))
     records = {record["name"]: record for record in json.loads(told)}
     for name, slot in modules.items():

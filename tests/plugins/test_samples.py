@@ -17,7 +17,7 @@ from contact_builtins.samples.packing import pack, unpack
 from contact_core.document.asset import Asset
 from contact_core.geometry.raycast import Locator
 from contact_core.geometry.report import report
-from contact_core.plugins.registry import resolve
+from contact_core.plugins.slot import resolve
 from contact_core.plugins.slots import Sample
 from contact_core.rig.rig import Rig, forward_kinematics, skin
 

@@ -13,7 +13,9 @@ from contact_core.errors import ContactError, InvalidInput
 from contact_core.interaction.heat import LEGEND
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.seen import SeenScene
-from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, PLACERS, POSE_SOLVERS, POSE_TERMS, TOOLS, Slot
+from contact_core.interaction.tool import TOOLS
+from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, PLACERS, POSE_SOLVERS, POSE_TERMS
+from contact_core.plugins.slot import Slot
 from contact_core.session import Session
 from contact_core.settings import Setting, settings_of
 from contact_viewer.look import hexed
@@ -147,7 +149,7 @@ def settings(interaction: Interaction) -> list[dict[str, Any]]:
     plugins = interaction.session.plugins
     if interaction.tool:
         groups.append(_group(interaction, TOOLS, interaction.tool))
-        tool = interaction.desk.tool(interaction.tool)
+        tool = interaction.tool_named(interaction.tool)
         for field, slot in _NAMED.items():
             named = getattr(tool, field, None)
             if isinstance(named, str) and named in plugins.offers(slot):

@@ -241,7 +241,7 @@ def test_settings_of_the_header_reach_the_tool(bpy: Any, artist: Any) -> None:
     held.paint.radius, held.paint.fresh = 0.25, True
     drag(bpy, artist, "paint", FINGER)
     drag(bpy, artist, "paint", FINGER)
-    tool = artist.interaction.desk.tool("paint")
+    tool = artist.interaction.tool_named("paint")
     assert tool.radius == pytest.approx(0.25) and tool.fresh
     assert len(artist.session.document.patches) == 2
     artist.do("edit.larger")

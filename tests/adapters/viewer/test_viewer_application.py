@@ -295,7 +295,7 @@ def test_settings_come_from_a_panel_checked(hand: Hand) -> None:
     groups = {group["name"]: group for group in panel.settings(interaction)}
     assert {"paint", "disk", "interaction"} <= set(groups)
     panel.set_setting(interaction, groups["paint"]["slot"], "paint", "radius", "0.01")
-    assert getattr(interaction.desk.tool("paint"), "radius") == 0.01  # noqa: B009  (a setting of this tool)
+    assert getattr(interaction.tool_named("paint"), "radius") == 0.01  # noqa: B009  (a setting of this tool)
     panel.set_setting(interaction, "", "interaction", "held", "wrist, thumb_tip")
     assert interaction.settings.held == ("wrist", "thumb_tip")
     for slot, name, item, value in (

@@ -17,8 +17,9 @@ from contact_core.document.schema import document_to_json
 from contact_core.geometry.exact_geodesics import log_map
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.interaction.interaction import Interaction
+from contact_core.interaction.tool import TOOLS
 from contact_core.interaction.view import world_per_pixel
-from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, POSE_SOLVERS, TOOLS
+from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, POSE_SOLVERS
 from contact_core.scene.problem import Objective, problem_of
 from contact_core.solve.levenberg_marquardt import LevenbergMarquardt
 from contact_core.solve.penetration import PenetrationTerm

@@ -17,10 +17,11 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.grasping.filled import KeepOutOfHollowsTerm
 from contact_core.grasping.judging import verdict
+from contact_core.grasping.slots import GRASP_SAMPLERS
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.lesson import STEPS, Lesson
+from contact_core.interaction.tool import TOOLS
 from contact_core.interaction.view import Perspective
-from contact_core.plugins.registry import GRASP_SAMPLERS, TOOLS
 from contact_core.testing.artist import Artist, ball_and_hand, block, shifted
 
 MUG = np.array([0.14811, 0.0, 0.0])  # where it stands, beside the hand

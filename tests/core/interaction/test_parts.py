@@ -22,9 +22,9 @@ from contact_core.interaction.events import Key, Pointer
 from contact_core.interaction.live import KeptContacts
 from contact_core.interaction.proposing import ghost_of
 from contact_core.interaction.seen import SeenSurface
+from contact_core.interaction.tool import TOOLS
 from contact_core.interaction.view import Perspective, View, on_plane, world_per_pixel
 from contact_core.interaction.work import Worker
-from contact_core.plugins.registry import TOOLS
 from contact_core.progress import Progress
 from contact_core.scene.problem import problem_of
 from contact_core.solve.penetration import PenetrationTerm
@@ -332,7 +332,7 @@ def test_the_radius_by_keys_and_pointer() -> None:
     hands = artist.hands
 
     def radius() -> float:
-        tool: Any = hands.desk.tool("paint")
+        tool: Any = hands.tool_named("paint")
         return float(tool.radius_on(hands.desk, "ball"))
 
     hands.select(surface="ball")

@@ -13,7 +13,7 @@ from contact_core.arrays import FloatArray
 from contact_core.document.schema import inconsistencies
 from contact_core.edit.listeners import DocumentChanged
 from contact_core.interaction.events import BUTTONS, KEY_NAMES, MODIFIERS, POINTER_KINDS, Event, Key, Pointer
-from contact_core.plugins.registry import TOOLS
+from contact_core.interaction.tool import TOOLS
 from contact_core.testing.artist import Artist, paired
 
 STREAMS, LENGTH = 64, 160  # 10,240 events; drawn by a seed, for a stream of hypothesis' own shrinks for minutes

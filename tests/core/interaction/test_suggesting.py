@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 
 from contact_core.grasp_files.grasp import HAND, OBJECT, prepare
+from contact_core.grasping.slots import GRASP_SAMPLERS
 from contact_core.interaction.interaction import Interaction
 from contact_core.interaction.view import Perspective
 from contact_core.plugins.manager import PluginManager
-from contact_core.plugins.registry import GRASP_SAMPLERS
 from contact_core.testing.artist import Artist, ball_and_hand, shifted
 
 VIEW = Perspective.looking_at((0.0, 0.08, 0.0), (0.0, 0.08, 1.0), viewport=(800, 600))

@@ -16,15 +16,8 @@ import contact_builtins
 from contact_core.errors import InvalidInput
 from contact_core.plugins import hookimpl
 from contact_core.plugins.manager import PluginManager, PluginRecord
-from contact_core.plugins.registry import (
-    AXIS_GENERATORS,
-    BRUSHES,
-    CLI,
-    PLACERS,
-    POSE_SOLVERS,
-    POSE_TERMS,
-    SLOTS,
-)
+from contact_core.plugins.registry import AXIS_GENERATORS, BRUSHES, CLI, PLACERS, POSE_SOLVERS, POSE_TERMS
+from contact_core.plugins.slot import SLOTS
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.penetration import PenetrationTerm
 
@@ -428,7 +421,7 @@ def test_the_built_ins_have_no_problem_and_fill_every_slot_that_is_theirs() -> N
     manager = PluginManager(environ={})
     record = record_of(manager, "builtins")
     assert record.origin == "built-in" and record.problems == []
-    wanted = {slot.noun for slot in SLOTS if not slot.core} - {"host"}
+    wanted = {slot.noun for slot in SLOTS.values() if not slot.core} - {"host"}
     assert wanted <= {noun for each in manager.records() if each.origin == "built-in" for noun in each.offers}
 
 

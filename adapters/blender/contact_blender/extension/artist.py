@@ -17,7 +17,7 @@ from contact_blender.extension.region_view import RegionView
 from contact_core.edit.listeners import DocumentChanged
 from contact_core.interaction.events import Pointer
 from contact_core.interaction.interaction import Interaction
-from contact_core.plugins.registry import TOOLS
+from contact_core.interaction.tool import TOOLS
 from contact_core.rig.rig import Pose
 from contact_core.session import Session
 

@@ -148,7 +148,7 @@ def follow(context: Any, interaction: Any) -> None:
     if held is None:
         return
     group = getattr(held, interaction.tool, None)
-    radius = getattr(interaction.desk.tool(interaction.tool), "radius", None) if interaction.tool else None
+    radius = getattr(interaction.tool_named(interaction.tool), "radius", None) if interaction.tool else None
     if radius is not None and group is not None and hasattr(group, "radius"):
         group.radius = radius
     held.all.live = interaction.settings.live
