@@ -44,7 +44,7 @@ def contact_pose_solvers() -> Offers:
     """Optimisers of a pose problem: `solve.solver.PoseSolver`."""
 @hookspec
 def contact_pose_terms() -> Offers:
-    """Terms of the pose objective: `solve.terms.PoseTerm` (classes; every problem makes its own)."""
+    """Terms of the pose objective: `solve.term.PoseTerm` (classes; every problem makes its own)."""
 @hookspec
 def contact_geodesic_engines() -> Offers:
     """Engines for distances, log maps and traces: `geometry.engine.GeodesicEngine`."""
