@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contact_core.arrays import FloatArray
+from contact_core.errors import Unreached
 from contact_core.geometry.surface_point import SurfacePoints
+from contact_core.geometry.tangent import direction_to_heading
 from contact_core.geometry.tracing import trace_geodesic
 from contact_core.grasping.features import features_of
 from contact_core.hands.description import Pad
@@ -46,7 +48,11 @@ def painted_pads(
     mesh = draft.geometry.mesh(scene.hand_name)
     largest = LARGEST * extent(scene, at)
     for pad in pads:
-        draft.patches.paint(pad.name, disk(mesh, pad, largest), surface=scene.hand_name, axis=pad.axis)
+        points = disk(mesh, pad, largest)
+        try:
+            draft.patches.paint(pad.name, points, surface=scene.hand_name, axis=pad.axis)
+        except Unreached:  # a robot's links are shells of their own, and the axis ends on the next one
+            draft.patches.paint(pad.name, points, surface=scene.hand_name, axis=axis_within(mesh, pad))
     return draft, tuple(pad.name for pad in pads), True
 
 
@@ -65,6 +71,15 @@ def disk(mesh: TriangleMesh, pad: Pad, largest: float) -> SurfacePoints:
     spokes = radius * np.sqrt(place / (count - 1)) * np.exp(1j * _GOLDEN_ANGLE * place)
     centres = SurfacePoints(np.repeat(pad.centre.faces, count), np.repeat(pad.centre.barycentric, count, axis=0))
     return trace_geodesic(mesh, centres, spokes).points
+
+
+def axis_within(mesh: TriangleMesh, pad: Pad) -> SurfacePoints:
+    """A pad's axis on the shell on which its middle lies: as far as that goes, both ways."""
+    centres = SurfacePoints(np.repeat(pad.centre.faces, 2), np.repeat(pad.centre.barycentric, 2, axis=0))
+    ends = pad.axis.positions(mesh)
+    heading = direction_to_heading(mesh, pad.centre, (ends[1] - ends[0])[None])[0]
+    traced = trace_geodesic(mesh, centres, pad.radius * heading * np.array([-1.0, 1.0]))
+    return traced.points
 
 
 def remark_on_size(scene: GraspScene) -> str:

@@ -218,3 +218,13 @@ def test_a_handle_takes_fingers_through_its_loop_and_the_thumb_stays_outside(
         (goes,) = digits_through(scene.hand, posed[scene.hand.joints][None], loops)
         roles = [digit.role for digit, through in zip(scene.hand.digits, goes.any(axis=0), strict=True) if through]
         assert one.facts.metrics["through_loop"] == roles, "the report names those"
+
+
+def test_a_hand_of_many_shells_is_not_refused(assets: Path) -> None:
+    """A robot's links are shells of their own: a pad's axis, sought in space, ended on the next link."""
+    hand = assets / "rigs" / "allegro_hand_right" / "allegro_hand_right.urdf"
+    session = prepare(str(hand), "sample:mug", 1.0, PluginManager()).session
+    settings = GraspSettings(count=1, sampler_settings={"places": 30, "most": 160})
+    (found,) = session.suggest(HAND, OBJECT, settings=settings)
+    session.accept(found.proposal)
+    assert session.document.pairs and HAND in session.document.poses
