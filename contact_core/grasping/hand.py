@@ -23,6 +23,8 @@ TESTED = 260  # points of the palm that an approach tests
 RIG_ROOM = 0.85  # how near two capsules of different digits may come, of the sum of their radii
 FREE = np.radians(100.0)  # how far joints without limits bend
 STIFF = np.radians(5.0)  # a joint with less room than this does not bend
+HINGED = (0.5, 0.75, 1.0, 0.25, 0.0)  # of its room, that a hinge turns a robot's thumb before the fingers
+BENT = (0.3, 0.0, 0.6)  # of its room, that the first hinge of a robot's thumb is bent
 SPREADS = np.radians([0.0, -10.0, 10.0])  # of fingers
 SPREAD_PRICE = 0.004  # hand lengths for ten degrees
 TWISTS, THUMB_SPREADS, THUMB_FLEXIONS = (
@@ -96,11 +98,14 @@ class Hand:
 
     @cached_property
     def firsts(self) -> IntArray:
-        """(D,) the first bone of each digit that bends."""
+        """(D,) the first bone of each digit that bends; of a robot's thumb that which turns before it bends."""
         flexing = [np.flatnonzero(self.flexes[a:b]) for a, b in zip(self.bones[:-1], self.bones[1:], strict=True)]
-        return np.array(
-            [a + (f[0] if len(f) else 0) for a, f in zip(self.bones[:-1], flexing, strict=True)], np.int64
-        )
+        result = [a + (f[0] if len(f) else 0) for a, f in zip(self.bones[:-1], flexing, strict=True)]
+        if self.thumb >= 0:
+            digit = self.digits[self.thumb]
+            if (turning := _turning(self.rig, digit)) is not _first_bending(self.rig, digit):
+                result[self.thumb] = self.bones[self.thumb] + digit.bones.index(turning)
+        return np.array(result, np.int64)
 
     @cached_property
     def bone_of_skin(self) -> IntArray:
@@ -304,9 +309,12 @@ def _coupling(rig: Rig, joints: IntArray, axes: FloatArray) -> tuple[IntArray, F
 def _starts(rig: Rig, digit: Digit) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Turns (s, 3, 3) of a digit's first bending bone to try before it closes, with flexions and prices (s,)."""
     first = _first_bending(rig, digit)
+    if digit.is_thumb and first is not (turning := _turning(rig, digit)):
+        return _hinged_starts(rig.freedoms[turning.joint])
     freedom = rig.freedoms[first.joint]
     if freedom.kind not in ("euler", "ball"):
-        return np.eye(3)[None], np.zeros(1), np.zeros(1)
+        angles = np.array(BENT if digit.is_thumb else (0.0,)) * _bend(freedom, first)[2]
+        return np.tile(np.eye(3), (len(angles), 1, 1)), angles, np.zeros(len(angles))
     frame = first.frame
     lower, upper = _room(freedom, frame)
     if not digit.is_thumb:
@@ -325,6 +333,34 @@ def _starts(rig: Rig, digit: Digit) -> tuple[FloatArray, FloatArray, FloatArray]
 
 def _first_bending(rig: Rig, digit: Digit) -> DigitBone:
     return next((bone for bone in digit.bones if _bend(rig.freedoms[bone.joint], bone)[2] > STIFF), digit.bones[0])
+
+
+def _turning(rig: Rig, digit: Digit) -> DigitBone:
+    """The bone that turns before a digit bends: the first that bends, or of a robot's thumb the first on a hinge of
+    its own across that, which brings it before the fingers."""
+    for bone in digit.bones if digit.is_thumb else ():
+        freedom = rig.freedoms[bone.joint]
+        if bone.flexes:
+            break
+        if freedom.kind == "hinge" and freedom.follows is None and np.ptp(_hinge_room(freedom)) > STIFF:
+            return bone
+    return _first_bending(rig, digit)
+
+
+def _hinge_room(freedom: JointFreedom) -> FloatArray:
+    """(2,) from where to where a hinge turns, within a right angle of rest where it has no end; 0 if locked."""
+    if freedom.locked is not None and freedom.locked[0]:
+        return np.zeros(2)
+    assert freedom.lower is not None and freedom.upper is not None
+    return np.clip([freedom.lower[0], freedom.upper[0]], -0.5 * np.pi, 0.5 * np.pi)
+
+
+def _hinged_starts(freedom: JointFreedom) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Turns (s, 3, 3) of a hinge over its room, the middle of it first, with flexions and prices (s,), all zero."""
+    low, high = _hinge_room(freedom)
+    angles = low + np.array(HINGED) * (high - low)
+    turns = np.array([turn_about(freedom.frame[:, 0], angle) for angle in angles])
+    return turns, np.zeros(len(angles)), np.zeros(len(angles))
 
 
 def _looks(rig: Rig, digit: Digit) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from contact_core.arrays import FloatArray
+from contact_core.arrays import FloatArray, IntArray
+from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
+from contact_core.geometry.surface_point import SurfacePoints
 from contact_core.hands.anatomy import Anatomy, across, unit
 from contact_core.hands.description import Digit, Pad, Palm
 from contact_core.rig.rig import Rig
@@ -13,6 +17,8 @@ from contact_core.rig.rig import Rig
 OF_DEPTH = 0.85  # a pad's radius, of how deep the bone lies there
 OF_WIDTH = 0.32  # the palm's, of the width between the outer knuckles
 AT_TIP, AT_MIDDLE, SIDE = 0.6, 0.5, 0.6  # where on the last bone, on others, and of a pad on the side
+
+LEAST_AXIS = 0.5  # of a pad's radius: an axis that is shorter says no direction
 
 
 def pads_of(anatomy: Anatomy, digits: tuple[Digit, ...], palm: Palm, hub: int, width: float) -> tuple[Pad, ...]:
@@ -76,7 +82,26 @@ def _pad(
     axis = locator.closest(ends, facing=np.tile(-normal, (2, 1)), facing_limit=-0.1)
     if not axis.found.all() or size <= 0:
         return None
-    return Pad(name, role, joint, centre, normal, axis.points, size)
+    points, parts = axis.points, _parts(mesh)
+    if (parts[points.faces] != parts[centre.faces]).any():
+        own = np.flatnonzero(parts == parts[centre.faces])
+        closest = Locator.of(TriangleMesh(mesh.points, mesh.faces[own])).closest(ends).points
+        points = SurfacePoints(own[closest.faces], closest.barycentric)
+        if np.linalg.norm(np.diff(points.positions(mesh), axis=0)) < LEAST_AXIS * size:
+            return None
+    return Pad(name, role, joint, centre, normal, points, size)
+
+
+def _parts(mesh: TriangleMesh) -> IntArray:
+    """(m,) which connected part each face is of; found once for a mesh. A robot's links are not connected, and a
+    place beside one link may be nearest to another."""
+    if _parts not in mesh.kept:
+        edges = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+        size = len(mesh.points)
+        graph = coo_array((np.ones(len(edges), np.int8), (edges[:, 0], edges[:, 1])), shape=(size, size))
+        mesh.kept[_parts] = connected_components(graph, directed=False)[1][mesh.faces[:, 0]]
+    found: IntArray = mesh.kept[_parts]
+    return found
 
 
 def palm_point(anatomy: Anatomy, inside: FloatArray, normal: FloatArray) -> FloatArray:

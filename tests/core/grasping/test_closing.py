@@ -11,11 +11,12 @@ import pytest
 from contact_core.geometry.distance_field import DistanceField
 from contact_core.geometry.mesh import TriangleMesh
 from contact_core.grasping.closing import ALONG, FOUND, TOUCH, Closed, close_hands, relaxed
-from contact_core.grasping.hand import Hand, turn_about
+from contact_core.grasping.hand import Hand, hand_of, turn_about
 from contact_core.grasping.hand_kernels import between, turned_root
 from contact_core.grasping.screening import thumb_along
-from contact_core.rig.rig import forward_kinematics
-from contact_core.testing import meshes
+from contact_core.hands.describe import describe_hand
+from contact_core.rig.rig import JointFreedom, forward_kinematics
+from contact_core.testing import meshes, rigs
 from contact_core.testing.grasp_sampler_contract import hand, request_for, thing
 
 N = 24
@@ -207,3 +208,38 @@ def test_a_start_is_a_turn_of_the_chart_and_so_is_what_lies_between() -> None:
         turned_root.py_func(out, one.look_frame, at[0], at[1])
         assert np.allclose(out, one.starts[one.thumb, place], atol=1e-9)
         assert at[2] == pytest.approx(one.start_angles[one.thumb, place])
+
+
+def with_a_hinged_thumb(locked: bool = False) -> Hand:
+    """The plain hand with a robot's thumb: a hinge along the thumb, then two that bend it."""
+    bone, across = np.array([0.7, 0.0, -0.7]) / 0.98995, np.array([0.7, 0.0, 0.7]) / 0.98995
+
+    def freedom(joint: int) -> JointFreedom:
+        if joint not in (1, 2, 3):
+            return rigs.limited_freedom(joint)
+        first, other = (bone, across) if joint == 1 else (-across, bone)
+        frame = np.stack([first, other, np.cross(first, other)], axis=1)
+        low, high = (-0.3, 1.2) if joint == 1 else (-0.1, 1.3)
+        still = np.array([locked and joint == 1])
+        return JointFreedom("hinge", frame=frame, lower=np.array([low]), upper=np.array([high]), locked=still)
+
+    rig = rigs.hand_like(freedom)
+    return hand_of(rig, describe_hand(rig))
+
+
+def test_a_robots_thumb_turns_on_its_hinge_before_it_bends_and_within_its_limits() -> None:
+    one, asked = with_a_hinged_thumb(), request_for("ball")
+    assert not one.flexes[0] and one.flexes[1] and one.firsts[one.thumb] == 0
+    hinge = one.rig.freedoms[int(one.joints[0])]
+    turned = []
+    for turn in one.starts[one.thumb, : one.start_counts[one.thumb]]:
+        assert np.allclose(turn @ hinge.frame[:, 0], hinge.frame[:, 0], atol=1e-9), "about the hinge"
+        local = hinge.frame.T @ turn @ hinge.frame
+        turned.append(float(np.arctan2(local[2, 1], local[1, 1])))
+    assert np.isclose(min(turned), -0.3) and np.isclose(max(turned), 1.2) and len(turned) >= 3
+    placed, ways = placements(one, asked.mesh)
+    closed = close_hands(one, asked.field, placed, ways)
+    still = close_hands(with_a_hinged_thumb(locked=True), asked.field, placed, ways)
+    away, before = (np.abs(each.fits[:, :3, 0][:, one.has_pad[:3]]).mean() for each in (closed, still))
+    assert away < 0.9 * before, "it comes nearer than one that does not turn"
+    assert (closed.angles[:, 1:3].max(axis=0) > 0.05).all(), "both bones that bend do"

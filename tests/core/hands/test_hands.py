@@ -374,3 +374,22 @@ def test_fingers_have_names_in_other_languages(fingers: tuple[str, ...]) -> None
             names[joint] = f"{word}{number}.L"
     told = describe_hand(replace(asset.rig, joints=tuple(names)))
     assert [(d.role, d.joints) for d in told.digits] == [(d.role, d.joints) for d in plain.digits]
+
+
+@pytest.mark.parametrize("sample", HANDS, ids=lambda sample: sample.name)
+def test_pads_and_their_axes_lie_on_one_link_where_links_are_not_connected(sample: object) -> None:
+    rig = built(sample)
+    owner = rig.skin_joints[np.arange(len(rig.bind_points)), rig.skin_weights.argmax(axis=1)]
+    links = owner[rig.faces[:, 0]]  # (m,) each face is a part of the link that holds its first corner
+    kept, place = np.unique(np.stack([rig.faces.ravel(), np.repeat(links, 3)], axis=1), axis=0, return_inverse=True)
+    apart = replace(
+        rig,
+        bind_points=rig.bind_points[kept[:, 0]],
+        faces=place.reshape(-1, 3),
+        skin_joints=rig.skin_joints[kept[:, 0]],
+        skin_weights=rig.skin_weights[kept[:, 0]],
+    )
+    pads = describe_hand(apart).pads
+    assert len(pads) >= 4
+    for pad in pads:
+        assert (links[pad.axis.faces] == links[pad.centre.faces]).all(), pad.name
