@@ -313,8 +313,8 @@ def _starts(rig: Rig, digit: Digit) -> tuple[FloatArray, FloatArray, FloatArray]
         return _hinged_starts(rig.freedoms[turning.joint])
     freedom = rig.freedoms[first.joint]
     if freedom.kind not in ("euler", "ball"):
-        angles = np.array(BENT if digit.is_thumb else (0.0,)) * _bend(freedom, first)[2]
-        return np.tile(np.eye(3), (len(angles), 1, 1)), angles, np.zeros(len(angles))
+        bent = np.array(BENT if digit.is_thumb else (0.0,)) * _bend(freedom, first)[2]
+        return np.tile(np.eye(3), (len(bent), 1, 1)), bent, np.zeros(len(bent))
     frame = first.frame
     lower, upper = _room(freedom, frame)
     if not digit.is_thumb:
