@@ -79,7 +79,8 @@ REFUSED: dict[str, tuple[bytes | str, str]] = {
     "cloud.ply": (header("ascii", "") + POINTS.encode(), "make a surface of them first"),
     "count_zero.stl": (b"x".ljust(80) + struct.pack("<I", 0) + FACETS, "has room for 12"),
     "headless.off": ("8 6 0\n" + POINTS + FACES, "first word is not OFF"),
-    "sdf.urdf": ('<sdf version="1.6"/>', "where a URDF has <robot>"),
+    "gazebo.urdf": ('<gazebo/>', "where a URDF has <robot>"),
+    "sdf.urdf": ('<sdf version="1.6"/>', "convert it to URDF"),
     "bare.urdf": ('<robot name="r"><link name="a"/></robot>', "<visual>"),
 }  # fmt: skip
 
@@ -99,6 +100,30 @@ def test_it_is_the_cube(tmp_path: Path, name: str) -> None:
     mesh = read_asset(written(tmp_path, name, RIGHT[name])).mesh
     assert len(mesh.points) == 8 and len(mesh.faces) == 12
     assert volume(mesh) == pytest.approx(8.0)
+
+
+MISTAKEN: dict[str, tuple[bytes | str, str]] = {
+    "page.glb": ("<!DOCTYPE html>\n<html><body>Not found</body></html>", "web page"),
+    "page.stl": ("\n<html>", "web page"),
+    "page.urdf": ("<!doctype html><html/>", "web page"),
+    "robot.dae": ('<?xml version="1.0"?><!-- made by hand --><robot name="r"/>', "name in .urdf"),
+    "scene.urdf": ('<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"/>', "name in .dae"),
+    "model.urdf": ("<mujoco><worldbody/></mujoco>", "MuJoCo"),
+    "cloud.obj": (header("ascii", USHORT_FACES) + (POINTS + FACES).encode(), "name in .ply"),
+    "layer.obj": ("#usda 1.0\n", "name in .usda"),
+    "scene.obj": (b"glTF\2\0\0\0", "name in .glb"),
+    "fbx.glb": (b"Kaydara FBX Binary  \0", "FBX"),
+    "small.obj": (b"\x1f\x8b\x08", "gzip"),
+    "picture.obj": (b"\x89PNG\r\n", "picture"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKEN)
+def test_what_a_file_is_in_truth_is_said(tmp_path: Path, name: str) -> None:
+    data, words = MISTAKEN[name]
+    with pytest.raises(FileRefused, match=name) as refusal:
+        read_asset(written(tmp_path, name, data))
+    assert words in str(refusal.value) and "damaged" not in str(refusal.value)
 
 
 def test_faces_at_no_place_are_left_out_and_counted(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from json import JSONDecodeError
 from pathlib import Path
 
+from contact_builtins.formats.mistaken import mistaken
 from contact_core.errors import FileRefused, InvalidInput
 
 _TOLD = 8  # names in a sentence
@@ -48,16 +49,21 @@ class NoSurface(InvalidInput):
 
 @contextmanager
 def refusing(path: Path, what: str) -> Iterator[None]:
-    """Everything that a damaged `what` ("an OBJ file") can cause, as FileRefused naming the file."""
+    """Everything that a damaged `what` ("an OBJ file") can cause, as FileRefused naming the file.
+
+    Where the file is something else by what it begins with, that is said.
+    """
     try:
         yield
-    except FileRefused:
-        raise
     except OSError as error:
         raise FileRefused(f"{path} cannot be read: {error.strerror or error}.") from error
-    except NoSurface as error:
-        raise FileRefused(f"{path} {error}") from error
-    except DAMAGE as error:
+    except (FileRefused, *DAMAGE) as error:
+        if told := mistaken(path):
+            raise FileRefused(told) from error
+        if isinstance(error, FileRefused):
+            raise
+        if isinstance(error, NoSurface):
+            raise FileRefused(f"{path} {error}") from error
         reason = _in_words(error)
         raise FileRefused(f"{path} was to be {what}, but is damaged: {reason[:300]}. Export it anew.") from error
 
