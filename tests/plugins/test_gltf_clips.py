@@ -129,6 +129,40 @@ def test_steps_and_nodes_above_are_sampled_at_whole_frames(rig: Rig, tmp_path: P
             assert Locator.of(rig.surface.with_points(wanted)).closest(seen).distance.max() < 1e-3
 
 
+def test_a_joint_that_is_scaled_to_nothing_for_a_while_is_read(rig: Rig, tmp_path: Path) -> None:
+    """How files hide a part: it and all that it carries are drawn nowhere, and the clip is there."""
+
+    def hidden(document: dict[str, Any]) -> None:
+        animation = document["animations"][0]
+        root = next(k for k, node in enumerate(document["nodes"]) if node.get("name") == rig.joints[0])
+        times = animation["samplers"][0]["input"]
+        count = document["accessors"][times]["count"]
+        document["accessors"].append({"componentType": 5126, "count": count, "type": "VEC3"})  # all zero
+        animation["samplers"].append({"input": times, "output": len(document["accessors"]) - 1})
+        target = {"node": root, "path": "scale"}
+        animation["channels"].append({"sampler": len(animation["samplers"]) - 1, "target": target})
+
+    path = changed(written(rig, keys_of(rig, (0.0, 5.0), cubic=False), tmp_path / "film.glb"), hidden)
+    (clip,) = GltfFiles().read_clips(path, rate=RATE)
+    read = GltfFiles().read(path).rig
+    assert read is not None
+    seen = skin(read, forward_kinematics(read.parents, clip.keys[0].poses[0].local))
+    assert np.isfinite(seen).all() and np.ptp(seen, axis=0).max() < 1e-5
+
+
+def test_of_keys_at_one_time_the_last_holds(rig: Rig, tmp_path: Path) -> None:
+    path = written(rig, keys_of(rig, (0.0, 5.0, 9.0), cubic=False), tmp_path / "film.glb")
+    data = bytearray(path.read_bytes())
+    times = np.array([0.0, 5.0, 9.0], "<f4") / np.float32(RATE)
+    at = data.index(times.tobytes())
+    data[at + 8 : at + 12] = times[1:2].tobytes()
+    (wanted,) = GltfFiles().read_clips(path, rate=RATE)
+    path.write_bytes(bytes(data))
+    (clip,) = GltfFiles().read_clips(path, rate=RATE)
+    assert clip.keys[0].frames == (0.0, 5.0)
+    assert np.allclose(clip.keys[0].poses[1].local, wanted.keys[0].poses[2].local, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

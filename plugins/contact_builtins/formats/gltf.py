@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from contact_builtins.formats.gltf_container import open_gltf
-from contact_builtins.formats.gltf_nodes import read_nodes
+from contact_builtins.formats.gltf_nodes import opened, read_nodes
 from contact_builtins.formats.gltf_rig import followed_by, rig_asset
 from contact_builtins.formats.gltf_scene import Part, read_parts
 from contact_builtins.formats.gltf_skeleton import read_skeleton
@@ -69,6 +70,7 @@ class GltfFiles:
             if not skins:
                 return read_clips(gltf, nodes, None, objects, rate)
             words = read_sidecar(told) if told else None
+            nodes = replace(nodes, world=opened(gltf, nodes, ())[0])
             rig = rig_asset(gltf, nodes, parts, words, notes).rig
             assert rig is not None
             return read_clips(

@@ -19,6 +19,7 @@ from contact_core.rig.pose_keys import hermite_weights, rotations_of
 
 MAX_CHANNELS, MAX_MATRICES = 100_000, 4_000_000
 SAME = 1e-4  # relative difference up to which tangents on both sides of a key count as one
+HIDING = 1e-6  # of a scale
 WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
 
 
@@ -92,8 +93,10 @@ def _channel(gltf: Gltf, node: int, path: str, sampler: dict[str, Any], rate: fl
     each = 3 if kind == "CUBICSPLINE" else 1
     if kind not in ("LINEAR", "STEP", "CUBICSPLINE") or values.shape != (each * len(times), WIDTHS[path]):
         raise InvalidInput(f"a channel of {path} has {len(times)} times and values {values.shape} of kind {kind!r}")
-    if not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+    if not len(times) or not np.isfinite(times).all() or (np.diff(times) < 0.0).any():
         raise InvalidInput("the times of an animation do not rise")
+    last = np.append(np.diff(times) > 0.0, True)  # of keys at one time the last holds from there on
+    times, values = times[last], values[np.repeat(last, each)]
     if not np.isfinite(values).all():
         raise InvalidInput("an animation holds values that are no numbers")
     before = after = None
@@ -156,6 +159,8 @@ class MovingNodes:
 
         result = np.tile(np.eye(4), (len(frames), 1, 1))
         turns = rotations_of(np.roll(of("rotation", [0.0, 0.0, 0.0, 1.0]), 1, axis=1))
-        result[:, :3, :3] = turns * of("scale", [1.0, 1.0, 1.0])[:, None, :]
+        scale = of("scale", [1.0, 1.0, 1.0])
+        # 0 is how files hide things for a while: nothing is seen at this size either, and the way back stays
+        result[:, :3, :3] = turns * np.where(np.abs(scale) < HIDING, HIDING, scale)[:, None, :]
         result[:, :3, 3] = of("translation", [0.0, 0.0, 0.0])
         return result
