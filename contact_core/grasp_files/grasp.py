@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,7 @@ from contact_core.progress import NO_PROGRESS, Progress
 from contact_core.recipe.recipe import AssetSource, ObjectSpec
 from contact_core.rig.pose_files import save_pose
 from contact_core.rig.rig import Pose
+from contact_core.scene.camera import camera_of
 from contact_core.scene.picture import Picture, PictureMesh
 from contact_core.session import Session
 from contact_core.solve.body import manipulator_length
@@ -201,31 +202,45 @@ def sheet(scene: GraspScene, found: Sequence[Suggestion]) -> list[Picture]:
     """Every grasp from two sides, one below the other, so many in a row as fit."""
     pictures = []
     for place, one in enumerate(found):
-        seen = np.concatenate([one.skin.points[np.concatenate(scene.hand.skin_of_digits)], _palm(scene, one)])
-        for side, eye in enumerate(views(scene.mesh, seen, one.way, scene.hand.length)):
+        picture = _picture(scene, one, place + 1)
+        for side, way in enumerate(_sides(scene, one, picture)):
+            caption = picture.caption if side == 0 else f"   {_beside(one)}"
             row = 2 * (place // COLUMNS) + side
-            pictures.append(_picture(scene, one, place + 1, side, row, seen, eye))
+            pictures.append(replace(picture, camera_from=tuple(way.tolist()), caption=caption, row=row))
     return sorted(pictures, key=lambda picture: picture.row)
 
 
-def _palm(scene: GraspScene, one: Suggestion) -> FloatArray:
-    """(k, 3) points of the palm's skin, in the object's space."""
-    return transform_points(one.placed, scene.hand.tested)
+def _beside(one: Suggestion) -> str:
+    return f"{spell('gap', one.facts.metrics['gap'])} gap {told_through(one.facts.metrics)}".rstrip()
 
 
-def _picture(
-    scene: GraspScene, one: Suggestion, place: int, side: int, row: int, seen: FloatArray, eye: FloatArray
-) -> Picture:
-    """One side of a grasp. seen: (k, 3) what of the hand is in the frame. eye: (3,) from where."""
+def _sides(scene: GraspScene, one: Suggestion, picture: Picture) -> tuple[FloatArray, FloatArray]:
+    """The ways (3,) to the eye of both sides of a grasp."""
+
+    def eye_of(way: FloatArray) -> FloatArray:
+        return camera_of(replace(picture, camera_from=tuple(way.tolist())), PANEL[0] / PANEL[1]).eye
+
+    return views((one.skin, scene.mesh), _own(scene, one), _near(scene, one), one.way, eye_of)
+
+
+def _own(scene: GraspScene, one: Suggestion) -> FloatArray:
+    """(k, 3) points of the skin of digits and palm, in the object's space."""
     digits = one.skin.points[np.concatenate(scene.hand.skin_of_digits)]
-    away = np.linalg.norm(scene.mesh.points - digits.mean(axis=0), axis=1)
-    near = scene.mesh.points[away < NEAR * scene.hand.length]
+    return np.concatenate([digits, transform_points(one.placed, scene.hand.tested)])
+
+
+def _near(scene: GraspScene, one: Suggestion) -> FloatArray:
+    """(k, 3) the object's vertices near the digits."""
+    middle = one.skin.points[np.concatenate(scene.hand.skin_of_digits)].mean(axis=0)
+    return scene.mesh.points[np.linalg.norm(scene.mesh.points - middle, axis=1) < NEAR * scene.hand.length]
+
+
+def _picture(scene: GraspScene, one: Suggestion, place: int) -> Picture:
+    """A grasp with what of it has to be in the frame."""
     word = "" if one.is_grasp else " - NOT good"
-    beside = f"{spell('gap', one.facts.metrics['gap'])} gap {told_through(one.facts.metrics)}".rstrip()
-    caption = f"{place}. {one.kind}{word}" if side == 0 else f"   {beside}"
     return Picture(
-        meshes=(PictureMesh(one.skin, SKIN), PictureMesh(scene.mesh, THING)),
-        camera_from=tuple(eye.tolist()), caption=caption, focus=np.concatenate([seen, near]), row=row,
+        meshes=(PictureMesh(one.skin, SKIN), PictureMesh(scene.mesh, THING)), caption=f"{place}. {one.kind}{word}",
+        focus=np.concatenate([_own(scene, one), _near(scene, one)]),
     )  # fmt: skip
 
 

@@ -1,6 +1,9 @@
-"""From where a grasp is looked at: beside the hand, but from another side where the object hides it there."""
+"""From where a grasp is looked at: beside the hand, but from another side where the hand or what it holds is hidden
+there by the object, or by the body behind the hand."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -9,17 +12,24 @@ from contact_core.geometry.mesh import TriangleMesh
 from contact_core.geometry.raycast import Locator
 from contact_core.grasping.hand import spread_out
 
-POINTS = 100  # of the hand, of which each view sees so many or not
-AWAY = 4.0  # hand lengths from the hand to an eye; what is farther hides nothing
-ABOVE = 0.01  # hand lengths that rays start from the skin
-ENOUGH = 0.5  # share of the hand that has to be seen from the usual sides
+HAND_POINTS, THING_POINTS = 80, 40  # of which each eye sees so many or not
+ABOVE = 0.02  # of how large all is that is looked at: how far rays start from a surface
+THING = 0.5  # what the thing counts, where the hand counts 1
+ENOUGH = 0.7  # of what the best eye sees that has to be seen from the usual sides
 APART = 0.35  # cosine of the angle that two views are apart, at most
 ROUND = 12
 
 
-def views(mesh: TriangleMesh, hand: FloatArray, way: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Two ways (3,) to the eye, far apart. hand: (k, 3) points of its skin. way: (3,) unit, from the palm into the
-    object. length: of the hand; all in the object's space."""
+def views(
+    meshes: Sequence[TriangleMesh],
+    hand: FloatArray,
+    thing: FloatArray,
+    way: FloatArray,
+    eye_of: Callable[[FloatArray], FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Two ways (3,) to the eye, far apart. meshes: what hides. hand: (k, 3) points of its skin, thing: (l, 3) of
+    the object near it. way: (3,) unit, from the palm into the object. eye_of: where the eye (3,) is that looks from
+    a way."""
     up = np.eye(3)[1]
     across = np.cross(way, up)
     across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.2 else np.eye(3)[0]
@@ -30,18 +40,31 @@ def views(mesh: TriangleMesh, hand: FloatArray, way: FloatArray, length: float) 
     others = [
         np.cos(turn) * across + np.sin(turn) * way + height * lift for height in (0.3, 1.2, -0.6) for turn in turns
     ]
-    eyes = np.array([*usual, *others, -way])
-    eyes = eyes / np.linalg.norm(eyes, axis=1)[:, None]
-    seen = seen_from_eyes(mesh, hand[spread_out(hand, POINTS, 0)], eyes, length)
-    first = 0 if seen[0] >= ENOUGH else int(seen.argmax())
-    seen = np.where(eyes @ eyes[first] < APART, seen, -1.0)
-    second = 1 if seen[1] >= ENOUGH else int(seen.argmax())
-    return eyes[first], eyes[second]
+    ways = np.array([*usual, *others, -way])
+    ways = ways / np.linalg.norm(ways, axis=1)[:, None]
+    eyes = np.array([eye_of(each) for each in ways])
+    seen = seen_from_eyes(meshes, hand[spread_out(hand, HAND_POINTS, 0)], eyes)
+    if len(thing):
+        seen = seen + THING * seen_from_eyes(meshes, thing[spread_out(thing, THING_POINTS, 0)], eyes)
+    first = _usual_or_best(seen, 0)
+    second = _usual_or_best(np.where(ways @ ways[first] < APART, seen, -1.0), 1)
+    return ways[first], ways[second]
 
 
-def seen_from_eyes(mesh: TriangleMesh, points: FloatArray, eyes: FloatArray, length: float) -> FloatArray:
-    """(e,) the share of points (k, 3) that the object does not hide from eyes (e, 3), unit, from the points."""
-    starts = points[None] + ABOVE * length * eyes[:, None]
-    ways = np.broadcast_to(eyes[:, None], starts.shape)
-    hit = Locator.of(mesh).cast(starts.reshape(-1, 3), ways.reshape(-1, 3), max_distance=AWAY * length)
-    return np.asarray(1.0 - hit.found.reshape(len(eyes), len(points)).mean(axis=1))
+def _usual_or_best(seen: FloatArray, usual: int) -> int:
+    return usual if seen[usual] >= ENOUGH * seen.max() else int(seen.argmax())
+
+
+def seen_from_eyes(meshes: Sequence[TriangleMesh], points: FloatArray, eyes: FloatArray) -> FloatArray:
+    """(e,) the share of points (k, 3), on surfaces, that eyes (e, 3) see: no mesh is between."""
+    starts = np.broadcast_to(points[None], (len(eyes), *points.shape)).reshape(-1, 3)
+    ways = np.repeat(eyes, len(points), axis=0) - starts
+    above = ABOVE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    far = np.maximum(np.linalg.norm(ways, axis=1), 1e-30)
+    starts = starts + np.minimum(above / far, 0.5)[:, None] * ways
+    hidden = np.zeros(len(starts), bool)
+    for mesh in meshes:
+        hidden |= (
+            Locator.of(mesh).cast(starts, np.repeat(eyes, len(points), axis=0) - starts, max_distance=1.0).found
+        )
+    return np.asarray(1.0 - hidden.reshape(len(eyes), len(points)).mean(axis=1))
