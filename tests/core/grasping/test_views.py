@@ -69,7 +69,7 @@ def test_what_is_held_is_seen_too() -> None:
 
 def test_the_usual_sides_are_kept_where_nothing_is_hidden() -> None:
     ball, way = meshes.icosphere(2), np.eye(3)[2]
-    far = TriangleMesh(ball.points + (0.0, 0.0, 30.0), ball.faces)
+    far = TriangleMesh(ball.points + 30.0 * way, ball.faces)
     first, second = views((far,), points(0.0), NOTHING, way, eye_of)
     assert first @ second < -0.7
     assert np.allclose(first, np.array([-1.0, 0.25, 0.35]) / np.linalg.norm([-1.0, 0.25, 0.35]))
