@@ -68,13 +68,18 @@ def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
 def check_writable(folder: Path, names: Collection[str]) -> None:
     """Raises FileRefused when `names` cannot be written into `folder`: told before the work, not after it."""
     there = next(place for place in (folder, *folder.absolute().parents) if os.path.lexists(place))
-    if not there.is_dir():
-        raise FileRefused(f"cannot write into {folder}: {there} is not a folder. Name another folder.")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise FileRefused(f"cannot write into {folder}: {there} is read-only for you. Name another folder.")
-    for name in names:
-        if (folder / name).is_dir():
-            raise FileRefused(f"cannot write {folder / name}: it is a folder. Name another folder, or remove it.")
+    try:
+        if not there.is_dir():
+            raise FileRefused(f"cannot write into {folder}: {there} is not a folder. Name another folder.")
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise FileRefused(f"cannot write into {folder}: {there} is read-only for you. Name another folder.")
+        for name in names:
+            if (folder / name).is_dir():
+                raise FileRefused(
+                    f"cannot write {folder / name}: it is a folder. Name another folder, or remove it."
+                )
+    except OSError as error:  # a server that is away
+        raise FileRefused(f"cannot write into {folder}: {error.strerror or error}. Try it again later.") from error
 
 
 def _remove_leftovers(folder: Path, mine: Path) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import tempfile
 import time
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -35,6 +37,12 @@ RETRIES = 2
 SEARCHED = ("CONTACT_ASSETS", "PXR_AR_DEFAULT_SEARCH_PATH")  # variables that say where assets are sought
 _GRACE_S = 10.0  # after its limit, a job that does not look at its progress is ended with its worker
 _LOOK_S = 0.5  # how often progress is told while nothing ends
+_PAUSE_S = 1.0  # after a disk failed: longer than mounts believe what they know of a folder
+_AWAY_S = 900.0  # that a server may be away
+_AWAY = {
+    errno.EIO, errno.ESTALE, errno.ENOTCONN, errno.ECONNREFUSED, errno.ECONNABORTED, errno.ECONNRESET,
+    errno.EHOSTUNREACH, errno.ENETDOWN, errno.ENETUNREACH, errno.ETIMEDOUT, getattr(errno, "EHOSTDOWN", errno.EIO),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -99,7 +107,7 @@ def run_batch(
 
     began, settings, out = time.monotonic(), settings or BatchSettings(), Path(out)
     workers, plugins = workers or LocalWorkers(), plugins or PluginManager()
-    run = _Run(settings, workers, progress)
+    run = _Run(settings, workers, progress, out)
     try:
         progress.tell(None, "Looking for jobs")
         if settings.solver is not None:
@@ -148,8 +156,8 @@ def _alone(out: Path) -> Iterator[None]:
 class _Run:
     """A batch while it runs."""
 
-    def __init__(self, settings: BatchSettings, workers: Workers, progress: Progress) -> None:
-        self.settings, self.workers, self.progress = settings, workers, progress
+    def __init__(self, settings: BatchSettings, workers: Workers, progress: Progress, out: Path) -> None:
+        self.settings, self.workers, self.progress, self.out = settings, workers, progress, out
         self.results: dict[str, Result] = {}
         self._waiting: deque[Task] = deque()
         self._running: dict[Future[Result], Task] = {}
@@ -157,6 +165,8 @@ class _Run:
         self._killed: set[Future[Result]] = set()
         self._attempts: Counter[str] = Counter()
         self._total = 0
+        self._look_again: float | None = None  # when, after a disk failed
+        self._away_since: float | None = None
         self.words = workers.words
 
     def leave_out(self, tasks: Sequence[Task]) -> None:
@@ -172,16 +182,34 @@ class _Run:
                 self.results[task.name] = known
 
     def work(self) -> None:
-        """Run what waits, until everything has ended. Raises Cancelled."""
+        """Run what waits, until everything has ended. Raises Cancelled, FileRefused."""
         while self._waiting or self._running:
-            while self._waiting and self.workers.free > 0:
-                self._start(self._waiting.popleft())
+            if self._waiting and self._may_start():
+                while self._waiting and self.workers.free > 0:
+                    self._start(self._waiting.popleft())
+            elif not self._running:
+                time.sleep(_LOOK_S)
             ended, _ = wait(self._running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
             for future in ended:
                 self._end(future)
             self._end_overdue()
             self.workers.check()
             self._tell()
+
+    def _may_start(self) -> bool:
+        """Whether there is somewhere to write results. Raises FileRefused where a server is away for too long."""
+        now = time.monotonic()
+        if self._look_again is None or now < self._look_again:
+            return self._look_again is None
+        trouble = _trouble_with(self.out)
+        if trouble is None:
+            self._look_again = self._away_since = None
+            return True
+        self._look_again = now + _PAUSE_S
+        self._away_since = now if self._away_since is None else self._away_since
+        if now - self._away_since > _AWAY_S:
+            raise FileRefused(f"{self.out} did not answer for {_AWAY_S / 60:g} minutes: {trouble}.")
+        return False
 
     def _start(self, task: Task) -> None:
         self._attempts[task.name] += 1
@@ -196,6 +224,12 @@ class _Run:
         self.workers.done(future)
         attempts = self._attempts[task.name]
         result = replace(self._result_of(future, task), attempts=attempts)
+        if result.again and result.worker:  # which lived to say what failed: a disk, or its memory
+            self._look_again = time.monotonic() + _PAUSE_S
+            if _trouble_with(self.out) is not None:  # no fault of the job
+                self._attempts[task.name] -= 1
+                self._waiting.append(task)
+                return
         if result.again and attempts <= self.settings.retries:
             self._waiting.append(task)
         else:
@@ -232,7 +266,22 @@ class _Run:
         self.words = self.workers.words
         text = f"{ended} of {self._total} jobs" + (f", {failed} failed" if failed else "")
         at_work = ", ".join(task.name for _, task in zip(range(3), self._running.values(), strict=False))
-        self.progress.tell(ended / max(self._total, 1), f"{text}; {self.words}: {at_work or 'idle'}")
+        doing = f"{self.words}: {at_work or 'idle'}"
+        if self._away_since is not None and not self._running:
+            doing = f"waiting for {self.out}, which does not answer"
+        self.progress.tell(ended / max(self._total, 1), f"{text}; {doing}")
+
+
+def _trouble_with(folder: Path) -> str | None:
+    """What the system says of a folder whose server does not answer, None where it does.
+
+    Looking at it is not enough: what is remembered of a folder may be older than the end of its server.
+    """
+    try:
+        with tempfile.NamedTemporaryFile(prefix=".contact-probe-", dir=folder):
+            return None
+    except OSError as error:  # where it is full, write-protected or gone, waiting helps nobody
+        return (error.strerror or str(error)) if error.errno in _AWAY else None
 
 
 def _written(run: _Run, tasks: Sequence[Task], out: Path, seconds: float) -> BatchResult:

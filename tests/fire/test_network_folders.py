@@ -9,9 +9,11 @@ import json
 import os
 import socket
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,7 +22,7 @@ import pytest
 
 from contact_core import atomic_file, mounts
 from contact_core.atomic_file import is_there, read_bounded, write_atomic
-from contact_core.atomic_set import replacing_set
+from contact_core.atomic_set import check_writable, replacing_set
 from contact_core.document import lock
 from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import parse_document
@@ -28,12 +30,15 @@ from contact_core.edit import journal
 from contact_core.edit.commands import SetExtra
 from contact_core.edit.recovery import journal_path
 from contact_core.errors import FileRefused
-from contact_core.farm import inputs
+from contact_core.farm import batch, inputs, workers
+from contact_core.farm.batch import BatchSettings, run_batch
 from contact_core.farm.inputs import Clock, Digests, as_read
-from contact_core.farm.task import _held
+from contact_core.farm.task import RECEIPT, Result, Task, _held, sealed_receipt
+from contact_core.farm.workers import NoWorkers
 from contact_core.library.shelf import Library
 from contact_core.library.starter import starter_library
 from contact_core.mounts import Mount, mount_of
+from contact_core.progress import CallbackProgress
 from contact_core.session import Session
 
 SSHFS = Mount("fuse.sshfs", frozenset({"rw"}))
@@ -297,6 +302,77 @@ def test_a_lock_on_a_server_that_is_gone_is_let_go_without_a_traceback(
     again = DocumentLock.take(path)
     assert isinstance(again, DocumentLock)
     again.release()
+
+
+@pytest.fixture
+def jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Three jobs, and a batch that waits for hundredths of what it waits for elsewhere."""
+    paths = [tmp_path / "jobs" / f"job{number}.json" for number in range(3)]
+    for path in paths:
+        with Session.open(path, discover=False) as session:
+            session.save()
+    monkeypatch.setattr(batch, "_PAUSE_S", 0.01)
+    monkeypatch.setattr(batch, "_LOOK_S", 0.01)
+    return paths
+
+
+class Server:
+    """Where results go: it does not answer until it was asked `left` times; jobs need it."""
+
+    def __init__(self, left: int, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.left, self.number, self._make = left, number, tempfile.NamedTemporaryFile
+        monkeypatch.setattr(batch.tempfile, "NamedTemporaryFile", self.make)
+        monkeypatch.setattr(workers, "perform", self.perform)
+
+    def make(self, *arguments: Any, **named: Any) -> Any:
+        self.left -= 1
+        if self.left >= 0:
+            raise OSError(self.number, os.strerror(self.number))
+        return self._make(*arguments, **named)
+
+    def perform(self, task: Task) -> Result:
+        folder = Path(task.folder)
+        if self.left > 0:
+            return Result(task.name, "failed", f"cannot write into {folder}.", again=True, worker="here")
+        result = Result(task.name, "done", worker="here")
+        write_atomic(folder / RECEIPT, sealed_receipt(task.key, task.kind, [], asdict(result)))
+        return result
+
+
+def test_a_batch_waits_for_a_server_and_no_job_pays_for_it(
+    tmp_path: Path, jobs: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, told = Server(7, errno.EIO, monkeypatch), list[str]()
+    progress = CallbackProgress(lambda fraction, text: told.append(text))
+    once = BatchSettings(retries=0)
+    result = run_batch(jobs, tmp_path / "out", once, workers=NoWorkers(), progress=progress)
+    assert [(each.state, each.attempts) for each in result.results] == [("done", 1)] * 3
+    assert server.left < 0 and any("out, which does not answer" in text for text in told)
+
+
+def test_a_server_that_stays_away_ends_the_batch_with_a_sentence_and_a_report(
+    tmp_path: Path, jobs: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Server(10**9, errno.ENOTCONN, monkeypatch)
+    monkeypatch.setattr(batch, "_AWAY_S", 0.1)
+    with pytest.raises(FileRefused, match="out did not answer for"):
+        run_batch(jobs, tmp_path / "out", workers=NoWorkers())
+    assert json.loads((tmp_path / "out" / "batch.json").read_text())["counts"]["stopped"] == 3
+
+
+def test_nobody_waits_for_a_full_disk(tmp_path: Path, jobs: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    Server(10**9, errno.ENOSPC, monkeypatch)
+    result = run_batch(jobs, tmp_path / "out", BatchSettings(retries=1), workers=NoWorkers())
+    assert [(each.state, each.attempts) for each in result.results] == [("failed", 2)] * 3
+
+
+def test_a_folder_of_results_that_does_not_answer_is_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Path, "is_dir", failing(errno.ECONNREFUSED, 1, Path.is_dir))
+    with pytest.raises(FileRefused, match=r"cannot write into .*Try it again later"):
+        check_writable(tmp_path, ("pose",))
+    check_writable(tmp_path, ("pose",))
 
 
 # -- folders of grasps and of results ------------------------------------------------------------------------------
