@@ -28,6 +28,7 @@ from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import parse_document
 from contact_core.edit import journal
 from contact_core.edit.commands import SetExtra
+from contact_core.edit.journal_file import read_journal
 from contact_core.edit.recovery import journal_path
 from contact_core.errors import FileRefused
 from contact_core.farm import batch, inputs, workers
@@ -139,6 +140,21 @@ def test_edits_of_another_machine_that_crashed_are_all_recovered(
     with Session.open(ours, discover=False) as again:  # nothing was written over the middle of the journal
         assert set(again.document.extras) == {*(f"x{number}" for number in range(30)), "more"}
     assert not list(tmp_path.glob("*damaged*")) and not list(tmp_path.glob("*unused*"))
+
+
+def test_no_line_is_written_over_others_where_the_system_takes_the_journal_for_shorter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "document.json"
+    with Session.open(path, discover=False) as session:
+        session.do(SetExtra("a", 1))
+        contents = read_journal(journal_path(path))
+    with monkeypatch.context() as old:
+        old.setattr(journal.os, "lseek", lambda *_: contents.length - 1)
+        assert Journal.resume(journal_path(path), contents) is None
+    resumed = Journal.resume(journal_path(path), read_journal(journal_path(path)))
+    assert resumed is not None
+    resumed.close(record=False)
 
 
 # -- files that others have open, or replace -----------------------------------------------------------------------
