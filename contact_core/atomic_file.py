@@ -137,7 +137,8 @@ def replacing(path: Path | str) -> Iterator[Path]:
             f"cannot write {path}: {error.strerror or error}. What was there before is untouched."
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # a server that is gone: the next writer removes it
+            temporary.unlink(missing_ok=True)
 
 
 def put_in_place(source: Path, target: Path) -> None:

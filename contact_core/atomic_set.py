@@ -58,8 +58,7 @@ def replacing_set(folder: Path, names: Collection[str]) -> Iterator[Path]:
         raise FileRefused(f"cannot write into {folder}: {error.strerror or error}. {state}") from error
     finally:
         shutil.rmtree(stage, ignore_errors=True)
-        if in_use is not None:
-            os.close(in_use)
+        _release(in_use)
         with contextlib.suppress(OSError):  # what was made for nothing goes; a folder that holds anything stays
             for place in made:
                 place.rmdir()
@@ -100,7 +99,7 @@ def _remove_leftovers(folder: Path, mine: Path) -> None:
         lock = _lock(stage, wait=False)
         if lock is not None:
             shutil.rmtree(stage, ignore_errors=True)
-            os.close(lock)
+            _release(lock)
 
 
 @contextlib.contextmanager
@@ -110,8 +109,7 @@ def _exclusive(folder: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        if lock is not None:
-            os.close(lock)
+        _release(lock)
 
 
 def _lock(folder: Path, *, wait: bool) -> int | None:
@@ -128,6 +126,12 @@ def _lock(folder: Path, *, wait: bool) -> int | None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        os.close(handle)
+        _release(handle)
         return None
     return handle
+
+
+def _release(lock: int | None) -> None:
+    if lock is not None:
+        with contextlib.suppress(OSError):  # a server that is gone fails the closing, too
+            os.close(lock)

@@ -134,9 +134,9 @@ class Journal:
         finally:
             self._closing.set()
             self._dirty.set()
-            with self._lock:
-                os.close(self._file)
-                self._file = -1
+            with self._lock, contextlib.suppress(OSError):  # it is flushed; a server that is gone fails this, too
+                file, self._file = self._file, -1
+                os.close(file)
             if self._flusher is not None:
                 self._flusher.join()
 

@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from contact_core import atomic_file, mounts
+from contact_core import atomic_file, atomic_set, mounts
 from contact_core.atomic_file import is_there, read_bounded, write_atomic
 from contact_core.atomic_set import check_writable, replacing_set
 from contact_core.document import lock
@@ -28,6 +28,7 @@ from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import parse_document
 from contact_core.edit import journal
 from contact_core.edit.commands import SetExtra
+from contact_core.edit.journal import Journal
 from contact_core.edit.journal_file import read_journal
 from contact_core.edit.recovery import journal_path
 from contact_core.errors import FileRefused
@@ -389,6 +390,40 @@ def test_a_folder_of_results_that_does_not_answer_is_a_sentence(
     with pytest.raises(FileRefused, match=r"cannot write into .*Try it again later"):
         check_writable(tmp_path, ("pose",))
     check_writable(tmp_path, ("pose",))
+
+
+def test_what_is_let_go_of_on_a_server_that_is_gone_is_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """fsync, close and unlink fail there, too."""
+    path, close = tmp_path / "document.json", os.close
+    session = Session.open(path, discover=False)
+    session.do(SetExtra("a", 1))
+    with monkeypatch.context() as gone, pytest.raises(FileRefused, match="the disk under"):
+        gone.setattr(journal.os, "fsync", failing(errno.EIO, 99))
+        gone.setattr(journal.os, "close", lambda file: close(file) or failing(errno.EIO, 1)())
+        session.close()
+    with Session.open(path, discover=False) as again:
+        assert dict(again.document.extras) == {"a": 1}
+    with monkeypatch.context() as gone, pytest.raises(FileRefused, match="untouched"):
+        gone.setattr(atomic_file.os, "fsync", failing(errno.EIO, 1))
+        gone.setattr(Path, "unlink", failing(errno.EIO, 1))
+        write_atomic(tmp_path / "file", "new")
+
+    class System:
+        """The module os, where every file that is closed fails."""
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(os, name)
+
+        def close(self, file: int) -> None:
+            close(file)
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(atomic_set, "os", System())
+    with replacing_set(tmp_path / "set", ("pose",)) as stage:
+        (stage / "pose").write_text("new")
+    assert (tmp_path / "set" / "pose").read_text() == "new"
 
 
 # -- folders of grasps and of results ------------------------------------------------------------------------------
