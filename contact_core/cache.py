@@ -44,13 +44,15 @@ def cached_arrays(
     """
     directory = cache_directory()
     path = None if directory is None else directory / kind / f"{key}.npz"
-    if path is not None and path.is_file():
+    if path is not None:
         try:
             with np.load(path, allow_pickle=False) as archive:
                 kept = {name: archive[name] for name in archive.files}
             if sorted(kept.pop(_NAMES).tolist()) == sorted(kept):
                 return kept
-        except Exception:  # whatever a damaged archive makes zipfile, zlib, numpy and its tokenizer say
+        except (
+            Exception
+        ):  # none there, a server that is away, whatever zipfile, zlib and numpy say of a damaged one
             pass
     arrays = make()
     if path is not None:

@@ -131,6 +131,8 @@ def open_file(path: Path, commands: CommandTable = BUILT_IN_COMMANDS) -> OpenedF
     """
     lock = DocumentLock.take(path)
     if isinstance(lock, str):
+        if not is_there(path) and not is_there(journal_path(path)):
+            raise FileRefused(f"cannot begin {path}: {lock}.")
         reason = f"{lock}; it is opened read-only here."
         return OpenedFile(path, History(read_only_document(path, commands)), None, None, (reason,), reason)
     try:

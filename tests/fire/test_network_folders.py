@@ -18,11 +18,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from contact_core import atomic_file, atomic_set, mounts
 from contact_core.atomic_file import is_there, read_bounded, write_atomic
 from contact_core.atomic_set import check_writable, replacing_set
+from contact_core.cache import cached_arrays
 from contact_core.document import lock
 from contact_core.document.lock import DocumentLock
 from contact_core.document.schema import parse_document
@@ -424,6 +426,27 @@ def test_what_is_let_go_of_on_a_server_that_is_gone_is_a_sentence(
     with replacing_set(tmp_path / "set", ("pose",)) as stage:
         (stage / "pose").write_text("new")
     assert (tmp_path / "set" / "pose").read_text() == "new"
+
+
+def test_a_cache_on_a_server_that_is_away_stands_in_nobodys_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is remembered to be there, and nothing in it can be looked at."""
+    monkeypatch.setenv("CONTACT_CACHE", str(tmp_path))
+    look = Path.stat
+    gone = failing(errno.EIO, 9999)
+    monkeypatch.setattr(Path, "stat", lambda p, **how: (gone if p.suffix == ".npz" else look)(p, **how))
+    assert cached_arrays("kind", "key", lambda: {"x": np.arange(3)})["x"].tolist() == [0, 1, 2]
+
+
+def test_a_new_document_where_no_locks_are_to_be_had_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lock, "_try_lock", failing(errno.ENOLCK, 1))
+    with pytest.raises(
+        FileRefused, match=f"cannot begin .*{os.strerror(errno.ENOLCK)}.*nobody can tell"
+    ):
+        Session.open(tmp_path / "document.json", discover=False)
 
 
 # -- folders of grasps and of results ------------------------------------------------------------------------------
