@@ -443,9 +443,7 @@ def test_a_new_document_where_no_locks_are_to_be_had_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lock, "_try_lock", failing(errno.ENOLCK, 1))
-    with pytest.raises(
-        FileRefused, match=f"cannot begin .*{os.strerror(errno.ENOLCK)}.*nobody can tell"
-    ):
+    with pytest.raises(FileRefused, match=f"cannot begin .*{os.strerror(errno.ENOLCK)}.*nobody can tell"):
         Session.open(tmp_path / "document.json", discover=False)
 
 
