@@ -59,7 +59,8 @@ class Session(GraspingSession):
     objects that become surfaces, None for all where the document knows none. surfaces: object ids by surface, for
     those that cannot be told. plugins: a manager to share, or modules or objects with hook implementations, of
     highest precedence; discover: whether entry points are read. engine: the geodesic engine, or its name, that
-    measures the coordinates of painted points; the exact one by default.
+    measures the coordinates of painted points; the exact one by default. notes: what was found while that was read
+    of which this session is; `notes` goes on with them.
 
     Use `Session.open` for a document file, and `surfaces.add` for every mesh. `stroke` gathers a drag into one
     step, `macro` several verbs. Use it as a context manager, or call `close`. It is for one thread at a time: while
@@ -76,6 +77,7 @@ class Session(GraspingSession):
         plugins: PluginManager | Iterable[object] = (),
         discover: bool = True,
         engine: str | GeodesicEngine | None = None,
+        notes: Iterable[str] = (),
     ) -> None:
         self.history = History(document or ContactDocument())
         self.rigs = {}
@@ -83,7 +85,7 @@ class Session(GraspingSession):
         self._listeners = Listeners()
         self._listeners.listen(self._tell_plugins)
         self._file: OpenDocument | None = None
-        self._opening_notes: tuple[str, ...] = ()
+        self._opening_notes: tuple[str, ...] = tuple(notes)
         self._ended: str | None = None  # why nothing can be edited any more
         self._open_edits = OpenEdits()
         self._plugins: PluginManager | None = None if isinstance(plugins, Iterable) else plugins
@@ -133,12 +135,12 @@ class Session(GraspingSession):
         from contact_core.scene.binding import surface_of
 
         surfaces = {name: surface_of(name, asset) for name, asset in assets.items()}
-        session = cls(ContactDocument(surfaces=FrozenMap(surfaces)), **arguments)
+        told = [f"{name}: {note}" for name, asset in assets.items() for note in asset.notes]
+        session = cls(ContactDocument(surfaces=FrozenMap(surfaces)), notes=told, **arguments)
         for name, asset in assets.items():
             session._derived.bring(asset.mesh)
             if asset.rig is not None:
                 session.rigs[name] = asset.rig
-        session._opening_notes = tuple(f"{name}: {note}" for name, asset in assets.items() for note in asset.notes)
         return session
 
     # -- files ---------------------------------------------------------------------------------------------------

@@ -33,6 +33,7 @@ from contact_viewer.tree import TreeActions
 
 Want: TypeAlias = Literal["open", "export", "library"]
 _SIDES = {"view.front": "front", "view.side": "right", "view.top": "top"}
+SHOWN = 3  # notes on what was read, in the line of status
 
 
 class Application(TreeActions, FileActions):
@@ -104,7 +105,9 @@ class Application(TreeActions, FileActions):
         self._recovery = recovery
         self._take(session)
         self._path = Path(sources[0]) if len(sources) == 1 and Path(sources[0]).is_file() else None
-        self.notes = list(session.notes)
+        self.notes = list(session.notes[:SHOWN])
+        if len(session.notes) > SHOWN:
+            self.notes.append(f"{len(session.notes) - SHOWN} more notes (contact inspect tells them).")
         if found is not None:
             self.notes.append("what was not saved the last time is back.")
 

@@ -77,10 +77,14 @@ def session_of(assets: Sequence[Asset], plugins: PluginManager, document: Contac
     for asset in assets:
         place, reach = _beside(asset, reach, host.space())
         host.add(asset, known.get(asset.mesh.topology_digest, place))
-    return _session_in(host, plugins, document)
+    return _session_in(
+        host, plugins, document, [f"{asset.name}: {note}" for asset in assets for note in asset.notes]
+    )
 
 
-def _session_in(host: ViewerHost, plugins: PluginManager, document: ContactDocument | None) -> Session:
+def _session_in(
+    host: ViewerHost, plugins: PluginManager, document: ContactDocument | None, notes: Sequence[str] = ()
+) -> Session:
     """A session on a document in a scene, which is posed as the document says: all of this is where it begins, so
     that nothing of it can be undone."""
     if document is not None:
@@ -92,11 +96,11 @@ def _session_in(host: ViewerHost, plugins: PluginManager, document: ContactDocum
             posing.binding.write(posing.document.poses)
         stored = StoredDocument.of(document, 0)
         host = ViewerHost(scene=replace(bare.scene, document=stored), path=host.path)
-    return _opened(ViewerHost(scene=host.scene, path=host.path), plugins)
+    return _opened(ViewerHost(scene=host.scene, path=host.path), plugins, notes)
 
 
-def _opened(host: ViewerHost, plugins: PluginManager) -> Session:
-    return Session(host=host, objects=None, plugins=plugins)
+def _opened(host: ViewerHost, plugins: PluginManager, notes: Sequence[str] = ()) -> Session:
+    return Session(host=host, objects=None, plugins=plugins, notes=notes)
 
 
 def add_files(session: Session, sources: Iterable[str | Path]) -> dict[str, tuple[str, ...]]:

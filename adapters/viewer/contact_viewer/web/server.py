@@ -117,7 +117,7 @@ class WebApplication:
             path = await self._received(request)
             self.app.notes.clear()
             self.app.bring([str(path)])
-            answer = web.Response(text=self.app.notes[-1] if self.app.notes else f"{path.name} is open.")
+            answer = web.Response(text=" ".join(self.app.notes) or f"{path.name} is open.")
         except ContactError as error:
             answer = web.Response(status=400, text=str(error))
         if self.stream is not None:
