@@ -23,6 +23,7 @@ DIRECTIONS = 96
 ROUND = (
     0.1  # by how much normals vary more across a thing than along it, as mean squares, where it is round for sure
 )
+RAISED = 0.3  # hand lengths: a thumb that is farther off is as good as there
 BACK = (0.06, 0.12, 0.2, 0.3)  # hand lengths of the way back out
 
 
@@ -127,6 +128,16 @@ def thumb_along(hand: Hand, skin: FloatArray, world: FloatArray, mesh: TriangleM
     last = int(hand.bones[hand.thumb + 1]) - 1
     tip = world[hand.joints[last], :3, :3] @ np.diff(hand.capsules[last], axis=0)[0]
     return float(along((sums / np.maximum(size, 1e-30)[:, None])[None], press[None], tip[None])[0])
+
+
+def thumb_away(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray) -> float:
+    """Hand lengths from the object to the nearest skin of the thumb's last bone, `RAISED` at most: a thumb whose
+    root alone touches sticks out into the air. 0 without a thumb that takes part. As for `opposition`."""
+    last = np.flatnonzero(hand.bone_of_skin == hand.bones[hand.thumb + 1] - 1)
+    if hand.thumb < 0 or not used[hand.thumb] or not len(last):
+        return 0.0
+    found = Locator.of(mesh).closest(skin[last], max_distance=RAISED * hand.length)
+    return float(found.distance[found.found].min(initial=RAISED * hand.length)) / hand.length
 
 
 def opposition(hand: Hand, skin: FloatArray, mesh: TriangleMesh, used: BoolArray) -> float:

@@ -26,6 +26,7 @@ from contact_core.grasping.facts import (
     opposition,
     skin_through,
     thumb_along,
+    thumb_away,
     uneven_curl,
 )
 from contact_core.grasping.hand import Hand
@@ -194,6 +195,7 @@ def judged(
         "skin_through": float(skin_through(hand, posed.points, world, scene.mesh).max()) / hand.length,
         "uneven_curl_deg": float(np.degrees(uneven_curl(hand, angles, used & touching, through.any(axis=0)))),
         "opposition_deg": float(np.degrees(opposition(hand, posed.points, scene.mesh, used))),
+        "thumb_away": thumb_away(hand, posed.points, scene.mesh, used),
         "thumb_along": thumb_along(hand, posed.points, world, scene.mesh),
         "crossing": crossing(hand, world),
         "closure": closure(contact_wrenches(posed, scene.mesh, hand.length)),

@@ -54,6 +54,7 @@ DEFINITIONS = {
     "skin_stretch_p99": "99th percentile over skin edges of posed / rest length",
     "max_joint_change_deg": "largest rotation of a joint (roots left out) away from rest, degrees",
     "opposition_deg": "median over the fingers of the angle from which each presses against thumb and palm",
+    "thumb_away": "how far the thumb's last bone is from the object, in hand lengths, 0.3 at most",
     "thumb_along": "how much the thumb points along what the fingers go round, 0 to 1; 0 on a ball or a plate",
     "crossing": "how far bones of two digits are in one another, as a share of how near they may come",
     "digits_through": "how many digits go through a loop at the place that was to be held",

@@ -34,6 +34,7 @@ GOOD: dict[str, Any] = {
     "uneven_curl_deg": 15.0,
     "opposition_deg": 150.0,
     "thumb_along": 0.0,
+    "thumb_away": 0.0,
     "crossing": 0.0,
     "digits_through": 0,
     "through_loop": [],

@@ -58,6 +58,12 @@ def test_what_hangs_on_a_limit_ranks_below_what_is_clear_of_it() -> None:
     assert score.score(replace(clear, failures=("it slips.",))) < score.score(replace(clear, margin=0.0))
 
 
+def test_a_thumb_whose_end_is_in_the_air_ranks_below_one_that_lies_on_the_thing() -> None:
+    score = Balanced()
+    assert score.score(facts("power", thumb_away=0.3)) < score.score(facts("power", thumb_away=0.03))
+    assert score.score(facts("power", thumb_away=0.03)) < score.score(facts("power"))
+
+
 def test_a_thumb_along_a_rod_ranks_below_one_across_it_but_not_in_a_pinch() -> None:
     score = Balanced()
     assert score.score(facts("power", thumb_along=0.9)) < score.score(facts("power"))

@@ -9,6 +9,7 @@ from contact_core.grasping.slots import GraspFacts
 from contact_core.settings import HasSettings, setting
 
 FIRM = 0.15  # closure from which more is no better: it is a floor, not an order
+IN_THE_AIR = 0.08  # hand lengths from the object at which a thumb's end is in the air for sure
 FAILURE = 0.6  # what each failure costs
 
 
@@ -28,6 +29,7 @@ class Balanced(HasSettings):
     )
     scissors: float = setting(0.5, low=0.0, help="what the thumb through one loop and a finger in another count")
     along: float = setting(0.7, low=0.0, help="what a thumb costs that lies along what the fingers go round")
+    raised: float = setting(0.6, low=0.0, help="what a thumb costs whose end is in the air")
     margin: float = setting(0.3, low=0.0, help="what it costs that the verdict hangs on a limit")
     clearance: float = setting(0.3, low=0.0, help="what a free way out counts")
 
@@ -41,6 +43,7 @@ class Balanced(HasSettings):
         value = self.contact * contact + self.hold * hold + self.comfort * facts.comfort
         if facts.kind not in ("pinch", "lateral") and not thumb:  # its loop says where it goes
             value -= self.along * m["thumb_along"]
+        value -= self.raised * min(m["thumb_away"] / IN_THE_AIR, 1.0)
         if not facts.failures:
             value -= self.margin * (1.0 - facts.margin)
             value += self.loop * min(m["digits_through"] - thumb, 4)

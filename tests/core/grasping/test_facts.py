@@ -18,6 +18,7 @@ from contact_core.grasping.facts import (
     opposition,
     skin_through,
     thumb_along,
+    thumb_away,
 )
 from contact_core.grasping.hand import Hand
 from contact_core.grasping.slots import KINDS
@@ -193,6 +194,24 @@ def test_along_is_the_way_of_a_rod_and_no_way_on_a_plate_or_a_ball() -> None:
 
     assert np.allclose(told(rod), [1.0, 0.0, 0.5])
     assert np.allclose(told(ball), 0.0) and np.allclose(told(plate), 0.0) and np.allclose(told(rod, 0.0), 0.0)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.15, 0.25])
+def test_a_thumb_is_as_far_away_as_the_nearest_skin_of_its_last_bone(share: float) -> None:
+    one, ball = hand(), meshes.icosphere(2)
+    posed = skin(one.rig, one.rig.rest_world)
+    used = np.ones(len(one.bones) - 1, bool)
+    last = np.flatnonzero(one.bone_of_skin == one.bones[1] - 1)
+    tip = posed[last][(posed[last] @ np.array([0.7, 0.0, -0.7])).argmax()]
+    beyond = tip + (0.02 + share) * one.length * np.array([0.7, 0.0, -0.7]) / 0.98995
+    thing_there = TriangleMesh(0.02 * one.length * ball.points + beyond, ball.faces)
+    away = thumb_away(one, posed, thing_there, used)
+    nearest = np.linalg.norm(posed[last] - beyond, axis=1).min() / one.length - 0.02
+    assert abs(away - nearest) < 0.003 and away > 0.8 * share
+    at_root = TriangleMesh(0.02 * one.length * ball.points + one.rig.rest_world[1, :3, 3], ball.faces)
+    assert thumb_away(one, posed, at_root, used) > 0.2, "that its root touches does not count"
+    used[one.thumb] = False
+    assert thumb_away(one, posed, thing_there, used) == 0.0, "in a hook it may"
 
 
 def test_a_thumb_at_rest_beside_a_rod_is_along_it_and_one_without_a_rod_is_not() -> None:
