@@ -278,7 +278,7 @@ def test_a_folder_that_cannot_be_written_opens_read_only(tmp_path: Path, monkeyp
         shared.save(tmp_path / "mine.json")
         shared.do(SetExtra("a", 1))
         shared.close(discard=True)
-    with pytest.raises(FileRefused, match="cannot begin .*Permission denied"):
+    with pytest.raises(FileRefused, match=r"cannot begin .*Permission denied"):
         Session.open(tmp_path / "share" / "new.json", discover=False)
 
 
