@@ -50,9 +50,7 @@ def cached_arrays(
                 kept = {name: archive[name] for name in archive.files}
             if sorted(kept.pop(_NAMES).tolist()) == sorted(kept):
                 return kept
-        except (
-            Exception
-        ):  # none there, a server that is away, whatever zipfile, zlib and numpy say of a damaged one
+        except Exception:  # there is none, its server is away, or whatever is said of a damaged one
             pass
     arrays = make()
     if path is not None:

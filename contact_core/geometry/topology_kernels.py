@@ -149,10 +149,8 @@ def _block(twin: IntArray, h: int) -> None:
 
 
 @inlined
-def angle_at(h: int, tail: IntArray, shape: FloatArray, points: FloatArray) -> float:
-    """The angle of its face at the tail of halfedge h (radians), from its record or, if it has none, the points."""
-    if shape[h, 0] > 0.0:
-        return math.atan2(shape[h, 2], shape[h, 1])
+def angle_at(h: int, tail: IntArray, points: FloatArray) -> float:
+    """The angle of its face at the tail of halfedge h (radians), from the points; bitwise as from its record."""
     _, x, y = corner_shape(tail[h], tail[following(h)], tail[preceding(h)], points)
     return math.atan2(y, x)
 
@@ -193,7 +191,7 @@ def order_fans(
         while True:
             if keep:
                 shape[h, 3] = angle
-            angle += angle_at(h, tail, shape, points)
+            angle += math.atan2(shape[h, 2], shape[h, 1]) if keep else angle_at(h, tail, points)
             seen += 1
             h = onward(h, twin)
             if h < 0 or h == first[v]:
@@ -219,11 +217,14 @@ def leave_unvisited(twin: IntArray, angle_sum: FloatArray) -> None:
 
 @inner
 def write_angles(v: int, mesh: Halfedges) -> None:
-    """Write the angles of the halfedges that leave v, in the order in which `order_fans` adds them up."""
+    """Write the angles of the halfedges that leave v, in the order in which `order_fans` adds them up.
+
+    Not from records of faces: another thread may be in the middle of one.
+    """
     h, angle = mesh.first[v], 0.0
     while True:
         mesh.shape[h, 3] = angle
-        angle += angle_at(h, mesh.tail, mesh.shape, mesh.points)
+        angle += angle_at(h, mesh.tail, mesh.points)
         h = onward(h, mesh.twin)
         if h < 0 or h == mesh.first[v]:
             break

@@ -70,7 +70,7 @@ class PluginRecord:
             except MissingExtra as error:
                 self.absent.append(f"{missing}{error}")
             except BaseException as error:
-                self.complain(f"{what} {spell(error)}.")
+                self.complain(f"{what} {spell(error)}.{_remedy(error)}")
         if lowered:
             self.complain("it lowered the recursion limit of Python, which is restored.")
 
@@ -82,3 +82,13 @@ def spell(error: BaseException) -> str:
     except Exception:  # an error of a plugin may fail even to say what it is
         said = ""
     return f"{type(error).__name__}: {said}".rstrip(": .")
+
+
+def _remedy(error: BaseException) -> str:
+    """What to do where a plugin asks the core for a name that it does not have."""
+    if not (isinstance(error, ImportError) and str(error.name).partition(".")[0] == "contact_core"):
+        return ""
+    return (
+        " It was written for another contact-core: CHANGELOG.md says what was renamed; follow it, or install the"
+        " version that the plugin was written for."
+    )

@@ -16,7 +16,11 @@ from contact_core.arrays import FloatArray
 from contact_core.settings import HasSettings, setting
 from contact_core.solve.bare_problem import BareProblem
 from contact_core.solve.state import PoseState
-from contact_core.solve.term import BoundTerm, PoseTerm
+from contact_core.solve.term import BoundTerm, LeastSquares, PoseTerm
+
+__all__ = [  # what a term is, too: plugins were told to import it from here
+    "BoundTerm", "DistanceTerm", "LeastSquares", "NormalTerm", "PoseTerm", "PriorTerm", "paper_terms",
+]  # fmt: skip
 
 REFERENCE_COUNT = 800.0  # the paper's typical number of contact points
 SMALLEST_DISTANCE = 1e-3  # in l: where reweighting stops sharpening |d|

@@ -9,6 +9,7 @@ is named.
 from __future__ import annotations
 
 import argparse
+import io
 import sys
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ import numpy as np
 
 from contact_builtins.samples.catalogue import ALL, MODELS
 from contact_builtins.samples.packing import pack
+from contact_core.atomic_file import write_atomic
 
 FOLDER = Path(__file__).parent / MODELS
 VERSIONS = FOLDER / "versions.txt"
@@ -34,15 +36,18 @@ def main(names: list[str] | None = None) -> int:
     parser.add_argument("names", nargs="*", metavar="NAME")
     wanted, kept = parser.parse_args(names).names, versions()
     if unknown := set(wanted) - {sample.name for sample in ALL}:
-        parser.error(f"there is no sample {', '.join(sorted(unknown))}")
+        known = ", ".join(sample.name for sample in ALL)
+        parser.error(f"there is no sample {', '.join(sorted(unknown))}; there are {known}.")
     FOLDER.mkdir(exist_ok=True)
     for sample in ALL:
         if sample.name in wanted or (not wanted and kept.get(sample.name) != sample.version()):
             sys.stdout.write(f"modelling {sample.name}\n")
             arrays: dict[str, Any] = pack(sample.generate())
-            np.savez_compressed(FOLDER / f"{sample.name}.npz", **arrays)
+            archive = io.BytesIO()
+            np.savez_compressed(archive, **arrays)
+            write_atomic(FOLDER / f"{sample.name}.npz", archive.getvalue())
             kept[sample.name] = sample.version()
-    VERSIONS.write_text("".join(f"{name} {version}\n" for name, version in sorted(kept.items())))
+    write_atomic(VERSIONS, "".join(f"{name} {version}\n" for name, version in sorted(kept.items())).encode())
     return 0
 
 

@@ -83,6 +83,8 @@ BROKEN = {
     "import_error": ("import no_such_module_anywhere\n", "No module named 'no_such_module_anywhere'"),
     "syntax_error": ("def (:\n", "cannot be imported: SyntaxError"),
     "exits": ("import sys; sys.exit(3)\n", "cannot be imported: SystemExit: 3"),
+    "of_old": ("from contact_core.solve.terms import Gone\n", "CHANGELOG.md says what was renamed"),
+    "of_older": ("import contact_core.gone\n", "CHANGELOG.md says what was renamed"),
     "misspelt": (OFFER + "@hookimpl\ndef contact_placer(): return [Mine()]\n", "did you mean contact_placers?"),
     "unmarked": (OFFER + "def contact_placers(): return [Mine()]\n", "not marked with @hookimpl"),
     "wrapper": (OFFER + "@hookimpl(wrapper=True)\ndef contact_placers():\n    yield\n", "wrappers are not called"),
